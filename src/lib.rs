@@ -1,0 +1,16 @@
+//! Bakes light-field probe volumes for global illumination on the CPU and measures them.
+//!
+//! The modules stand on floors; each uses only the floors below it:
+//!
+//! | floor | modules | role |
+//! |---|---|---|
+//! | 0 numbers | [`math`] | maps, sampling, statistics; no scene, no probes |
+//! | 1 matter | [`scene`], [`image`] | glTF to world-space triangles, materials, lights, cameras; pictures |
+//! | 2 rays | [`trace`] | Embree behind one small type; the only unsafe code |
+//! | 3 light | [`light`] | what a surface sends out: one definition for bake and render |
+//! | 4 probes | [`probe`] | grid, placement, capture, solver, filter, encoding, query, file |
+//! | 5 results | [`shade`], [`report`] | pictures and figures |
+//! | 6 edge | [`config`], [`plan`], [`cli`], [`commands`] | what was asked, what is done about it |
+#![deny(unsafe_code)]
+
+pub mod scene;

@@ -39,10 +39,15 @@ impl EnvironmentMap {
 
     /// Radiance along a unit direction: the texel that holds it. Nearest, so that sampling by texel is exact.
     pub fn radiance(&self, direction: Vec3) -> Vec3 {
+        self.texels[self.texel_index(direction)]
+    }
+
+    /// Index in [`Self::texels`] of the texel that holds a unit direction.
+    pub fn texel_index(&self, direction: Vec3) -> usize {
         let uv = Self::uv(direction);
         let x = ((uv.x * self.width as f32) as usize).min(self.width - 1);
         let y = ((uv.y * self.height as f32) as usize).min(self.height - 1);
-        self.texels[y * self.width + x]
+        y * self.width + x
     }
 }
 

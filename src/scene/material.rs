@@ -14,7 +14,9 @@ pub struct TextureIndex(pub u32);
 pub enum AlphaMode {
     Opaque,
     /// Rays pass where alpha is below `cutoff`.
-    Mask { cutoff: f32 },
+    Mask {
+        cutoff: f32,
+    },
     /// Rays pass with probability 1 − alpha.
     Blend,
 }

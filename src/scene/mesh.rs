@@ -1,5 +1,7 @@
 //! All triangles of a scene in one vertex pool.
 
+use std::ops::{Add, Mul};
+
 use glam::{Vec2, Vec3, Vec4};
 
 use super::MaterialIndex;
@@ -29,4 +31,40 @@ pub struct Mesh {
     pub materials: Vec<MaterialIndex>,
     /// The first so many triangles have [`super::AlphaMode::Opaque`] materials; the rest need an alpha test.
     pub opaque_count: usize,
+}
+
+impl Mesh {
+    /// Positions of a triangle's vertices.
+    pub fn corners(&self, triangle: TriangleIndex) -> [Vec3; 3] {
+        self.triangles[triangle.0 as usize].map(|v| self.positions[v as usize])
+    }
+
+    /// Vertex attribute at barycentric coordinates (weights of the second and third vertex).
+    pub fn interpolate<T>(&self, attribute: &[T], triangle: TriangleIndex, barycentric: Vec2) -> T
+    where
+        T: Copy + Add<Output = T> + Mul<f32, Output = T>,
+    {
+        let [a, b, c] = self.triangles[triangle.0 as usize].map(|v| attribute[v as usize]);
+        a * (1.0 - barycentric.x - barycentric.y) + b * barycentric.x + c * barycentric.y
+    }
+
+    /// Unit normal of the front side.
+    pub fn geometric_normal(&self, triangle: TriangleIndex) -> Vec3 {
+        let [a, b, c] = self.corners(triangle).map(|p| p.as_dvec3());
+        // In f64, because slivers of 10⁴:1 leave an f32 cross product few digits.
+        (b - a).cross(c - a).normalize_or_zero().as_vec3()
+    }
+
+    /// Area in m².
+    pub fn area(&self, triangle: TriangleIndex) -> f32 {
+        let [a, b, c] = self.corners(triangle).map(|p| p.as_dvec3());
+        (0.5 * (b - a).cross(c - a).length()) as f32
+    }
+
+    /// Smallest box around all vertices that triangles use, `None` without triangles.
+    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        let mut vertices = self.triangles.iter().flatten().map(|&v| self.positions[v as usize]);
+        let first = vertices.next()?;
+        Some(vertices.fold((first, first), |(low, high), p| (low.min(p), high.max(p))))
+    }
 }

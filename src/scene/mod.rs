@@ -6,8 +6,10 @@
 pub mod camera;
 pub mod environment;
 pub mod light;
+mod lookup;
 pub mod material;
 pub mod mesh;
+mod texture;
 
 pub use camera::Camera;
 pub use environment::Environment;

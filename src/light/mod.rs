@@ -1,0 +1,34 @@
+//! Light: what a surface sends out and what arrives at it. Bake, render and reference use these and no others.
+
+pub mod emitters;
+pub mod lambert;
+pub mod punctual;
+pub mod sampled;
+pub mod surface;
+
+use crate::scene::Scene;
+use crate::trace::{TraceError, Tracer};
+use emitters::Emitters;
+
+/// What one needs to ask about light in a scene: the scene itself, rays, and the means to sample its emitters.
+pub struct World<'s> {
+    pub scene: &'s Scene,
+    pub tracer: Tracer<'s>,
+    pub emitters: Emitters,
+    /// Factor on all punctual lights (some exporters multiply them by 683 and emission not).
+    pub punctual_scale: f32,
+    /// Largest albedo allowed per channel; larger ones are clamped to it, so that bounces converge.
+    pub albedo_max: f32,
+}
+
+impl<'s> World<'s> {
+    pub fn new(scene: &'s Scene, punctual_scale: f32, albedo_max: f32) -> Result<World<'s>, TraceError> {
+        let tracer = Tracer::build(scene)?;
+        Ok(World { scene, tracer, emitters: Emitters::new(scene), punctual_scale, albedo_max })
+    }
+
+    /// Whether anything but punctual lights sends out light.
+    pub fn has_emitters(&self) -> bool {
+        !self.emitters.is_empty()
+    }
+}

@@ -1,0 +1,178 @@
+//! Outputs appear whole or not at all: every writer of the project goes through [`write_atomically`].
+
+use std::fs::{self, File, Permissions};
+use std::io::{self, BufWriter, ErrorKind, Write};
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+/// Mode asked for when a file is created; the kernel takes the umask's bits away.
+/// The temporary-file crate would otherwise make it private to its owner (0600).
+const MODE_BEFORE_UMASK: u32 = 0o666;
+
+/// Start of the temporary file's name, which lies beside the output until it is renamed.
+const TEMPORARY_PREFIX: &str = ".lightprobe-";
+
+/// What a writer writes into; it can seek, as EXR's table of offsets needs.
+pub type OutputFile<'a> = BufWriter<&'a mut File>;
+
+/// An output could not be written; nothing of it was left behind.
+#[derive(Debug, Error)]
+pub enum OutputError {
+    #[error("cannot write {path}: the folder {folder} does not exist; create it or choose another path")]
+    NoFolder { path: PathBuf, folder: PathBuf },
+    #[error("cannot write {path}: no permission; make {folder} writable or choose another path")]
+    Denied { path: PathBuf, folder: PathBuf },
+    #[error("cannot write {path}: the disk is full; free some space or choose another disk")]
+    Full { path: PathBuf },
+    #[error("cannot write {path}: it exists and is not a regular file; give the name of a file")]
+    NotAFile { path: PathBuf },
+    #[error("cannot create the folder {path}: {blocker} is a file; remove it or choose another path")]
+    FileInTheWay { path: PathBuf, blocker: PathBuf },
+    #[error("cannot write {path}: {cause}; choose another path")]
+    Other { path: PathBuf, cause: io::Error },
+}
+
+/// Writes `path` by way of a temporary file in the same folder, which is synced to the disk and then renamed: readers see the
+/// old file or the new one, never a part. An existing file is replaced; through a symbolic link, the file it points to.
+///
+/// # Errors
+/// Those of the disk, and whatever error `write` returns; in each case the temporary file is removed and `path` untouched.
+pub fn write_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut OutputFile<'_>) -> io::Result<()>,
+) -> Result<(), OutputError> {
+    // A rename over /dev/null or a pipe would replace the device by a file.
+    if fs::metadata(path).is_ok_and(|existing| !existing.is_file()) {
+        return Err(OutputError::NotAFile { path: path.to_owned() });
+    }
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let folder = folder_of(&target);
+    let written = (|| {
+        let mut temporary = tempfile::Builder::new()
+            .prefix(TEMPORARY_PREFIX)
+            .suffix(".tmp")
+            .permissions(Permissions::from_mode(MODE_BEFORE_UMASK))
+            .tempfile_in(folder)?;
+        let mut file = BufWriter::new(temporary.as_file_mut());
+        write(&mut file)?;
+        file.flush()?;
+        drop(file);
+        temporary.as_file().sync_all()?;
+        temporary.persist(&target).map_err(|failed| failed.error)?;
+        // The rename lives in the folder. Some file systems cannot sync a folder; the file itself is safe by now.
+        let _ = File::open(folder).and_then(|folder| folder.sync_all());
+        Ok(())
+    })();
+    written.map_err(|cause| output_error(path, folder, cause))
+}
+
+/// Creates `path` and the folders above it where they are missing.
+///
+/// # Errors
+/// A file in the way, no permission, a full disk.
+pub fn create_folder(path: &Path) -> Result<(), OutputError> {
+    fs::create_dir_all(path).map_err(|cause| match path.ancestors().find(|part| part.is_file()) {
+        Some(blocker) => OutputError::FileInTheWay { path: path.to_owned(), blocker: blocker.to_owned() },
+        None => output_error(path, folder_of(path), cause),
+    })
+}
+
+/// The folder that `path` lies in; "." for a bare file name.
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    }
+}
+
+fn output_error(path: &Path, folder: &Path, cause: io::Error) -> OutputError {
+    let path = path.to_owned();
+    let folder = folder.to_owned();
+    match cause.kind() {
+        ErrorKind::NotFound | ErrorKind::NotADirectory if !folder.is_dir() => OutputError::NoFolder { path, folder },
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => OutputError::Denied { path, folder },
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => OutputError::Full { path },
+        ErrorKind::IsADirectory => OutputError::NotAFile { path },
+        _ => OutputError::Other { path, cause },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Seek;
+
+    use super::*;
+
+    fn names_in(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+    }
+
+    #[test]
+    fn replaces_the_old_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out.bin");
+        fs::write(&path, "old and longer").unwrap();
+        write_atomically(&path, |file| {
+            file.write_all(b"xew")?;
+            file.rewind()?;
+            file.write_all(b"n")
+        })
+        .unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(names_in(folder.path()), ["out.bin"]);
+    }
+
+    #[test]
+    fn failure_leaves_nothing_behind_and_the_old_file_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out.bin");
+        let fail = |file: &mut OutputFile<'_>| {
+            file.write_all(b"half of it")?;
+            Err(io::Error::from(ErrorKind::StorageFull))
+        };
+        assert!(matches!(write_atomically(&path, fail), Err(OutputError::Full { .. })));
+        assert!(names_in(folder.path()).is_empty());
+        fs::write(&path, "old").unwrap();
+        assert!(write_atomically(&path, fail).is_err());
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(names_in(folder.path()), ["out.bin"]);
+    }
+
+    #[test]
+    fn errors_name_the_path_and_the_remedy() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = folder.path().join("nowhere/out.bin");
+        let message = write_atomically(&missing, |_| Ok(())).unwrap_err().to_string();
+        assert!(message.contains("nowhere/out.bin") && message.contains("create it"), "{message}");
+        assert!(matches!(write_atomically(folder.path(), |_| Ok(())), Err(OutputError::NotAFile { .. })));
+        assert!(matches!(write_atomically(Path::new("/dev/null"), |_| Ok(())), Err(OutputError::NotAFile { .. })));
+        fs::write(folder.path().join("file"), "").unwrap();
+        let blocked = create_folder(&folder.path().join("file/below/it")).unwrap_err();
+        assert!(matches!(blocked, OutputError::FileInTheWay { .. }), "{blocked}");
+        let below_a_file = folder.path().join("file/out.bin");
+        assert!(matches!(write_atomically(&below_a_file, |_| Ok(())), Err(OutputError::NoFolder { .. })));
+    }
+
+    #[test]
+    fn links_stay_links() {
+        let folder = tempfile::tempdir().unwrap();
+        let (target, link) = (folder.path().join("target"), folder.path().join("link"));
+        fs::write(&target, "old").unwrap();
+        std::os::unix::fs::symlink(&target, &link).unwrap();
+        write_atomically(&link, |file| file.write_all(b"new")).unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read(&target).unwrap(), b"new");
+    }
+
+    #[test]
+    fn folders_are_created_and_may_exist() {
+        let folder = tempfile::tempdir().unwrap();
+        let deep = folder.path().join("a/b");
+        create_folder(&deep).unwrap();
+        create_folder(&deep).unwrap();
+        assert!(deep.is_dir());
+    }
+}

@@ -1,0 +1,177 @@
+//! Filters over a probe's captured sphere: irradiance, and moments of distance.
+//!
+//! Both are weighted means over the capture's texels with weights that depend on directions alone, so they are
+//! computed once and shared by all probes. Rows are normalised to 1: constant radiance L gives an irradiance of
+//! exactly πL, whatever the resolutions.
+
+use std::f32::consts::PI;
+
+use glam::{Vec2, Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::math::octahedral::{direction_from_oct, solid_angle_density, texel_direction};
+use crate::math::statistics::Moments;
+
+/// Points per side at which the weight of one capture texel is integrated.
+const QUADRATURE: usize = 4;
+
+/// Weights below this share of a row's largest are left out: together they are below f32's own rounding.
+const NEGLIGIBLE: f32 = 1e-9;
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FilterSettings {
+    /// Interior texels per side of the irradiance map.
+    pub irradiance_resolution: usize,
+    /// Interior texels per side of the distance map.
+    pub distance_resolution: usize,
+    /// Exponent k of the lobe max(0, ω·d)^k that distances are averaged under.
+    pub distance_exponent: f32,
+    /// Distances beyond this many cell diagonals count as this; so do misses.
+    pub distance_clamp: f32,
+}
+
+impl Default for FilterSettings {
+    fn default() -> Self {
+        FilterSettings {
+            irradiance_resolution: 8,
+            distance_resolution: 14,
+            distance_exponent: 50.0,
+            distance_clamp: 1.5,
+        }
+    }
+}
+
+/// A sparse matrix from capture texels to the texels of a stored map; each row sums to 1.
+#[derive(Debug, Clone)]
+pub struct Kernel {
+    /// `row_start[o]..row_start[o + 1]` are the entries of output texel `o`.
+    row_start: Vec<usize>,
+    entries: Vec<(u32, f32)>,
+}
+
+impl Kernel {
+    /// Cosine-weighted means around the texel directions of an `out`² map: irradiance ÷ π.
+    pub fn cosine(capture: usize, out: usize) -> Kernel {
+        Kernel::lobe(capture, out, 1.0)
+    }
+
+    /// Means under max(0, ω·d)^`exponent`.
+    pub fn lobe(capture: usize, out: usize, exponent: f32) -> Kernel {
+        let mut kernel = Kernel { row_start: vec![0], entries: Vec::new() };
+        let points = quadrature(capture);
+        for o in 0..out * out {
+            let axis = texel_direction(o % out, o / out, out);
+            let row: Vec<f32> = points
+                .iter()
+                .map(|texel| texel.iter().map(|(d, w)| axis.dot(*d).max(0.0).powf(exponent) * w).sum())
+                .collect();
+            kernel.push_row(&row);
+        }
+        kernel
+    }
+
+    fn push_row(&mut self, weights: &[f32]) {
+        let largest = weights.iter().copied().fold(0.0, f32::max);
+        let kept = || weights.iter().enumerate().filter(|(_, w)| **w > NEGLIGIBLE * largest);
+        let sum: f64 = kept().map(|(_, &w)| f64::from(w)).sum();
+        self.entries.extend(kept().map(|(t, &w)| (t as u32, (f64::from(w) / sum) as f32)));
+        self.row_start.push(self.entries.len());
+    }
+
+    pub fn rows(&self) -> usize {
+        self.row_start.len() - 1
+    }
+
+    fn row(&self, o: usize) -> &[(u32, f32)] {
+        &self.entries[self.row_start[o]..self.row_start[o + 1]]
+    }
+
+    /// Irradiance, W·m⁻², around every output direction from the radiance in every capture texel:
+    /// `E(n) = π · Σ L·w / Σ w`, w = max(0, n·ω)·ΔΩ.
+    pub fn irradiance(&self, radiance: &[Vec3], out: &mut [Vec3]) {
+        for (o, value) in out.iter_mut().enumerate() {
+            *value = PI * self.row(o).iter().map(|&(t, w)| radiance[t as usize] * w).sum::<Vec3>();
+        }
+    }
+
+    /// Mean and variance of distance around every output direction from those within every capture texel, metres.
+    pub fn distance(&self, texels: &[Moments]) -> Vec<Moments> {
+        let mix = |o: usize| {
+            let mut sum = Moments::default();
+            for &(t, w) in self.row(o) {
+                let m = &texels[t as usize];
+                sum.add_set(m.mean(), m.variance(), f64::from(w));
+            }
+            sum
+        };
+        (0..self.rows()).map(mix).collect()
+    }
+}
+
+/// Directions in every capture texel with the solid angle that each stands for.
+fn quadrature(resolution: usize) -> Vec<[(Vec3, f32); QUADRATURE * QUADRATURE]> {
+    let fine = (resolution * QUADRATURE) as f32;
+    let texel = |t: usize| {
+        let corner = Vec2::new((t % resolution) as f32, (t / resolution) as f32) * QUADRATURE as f32;
+        std::array::from_fn(|i| {
+            let inside = Vec2::new((i % QUADRATURE) as f32 + 0.5, (i / QUADRATURE) as f32 + 0.5);
+            let oct = (corner + inside) / fine * 2.0 - 1.0;
+            (direction_from_oct(oct), solid_angle_density(oct))
+        })
+    };
+    (0..resolution * resolution).map(texel).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn constant_radiance_gives_pi_times_it() {
+        for (capture, out) in [(8, 6), (16, 8), (5, 1)] {
+            let kernel = Kernel::cosine(capture, out);
+            let mut e = vec![Vec3::ZERO; out * out];
+            kernel.irradiance(&vec![Vec3::ONE; capture * capture], &mut e);
+            // Rows are normalised in f64; what is left is the rounding of a sum of f32.
+            assert!(e.iter().all(|e| (e.x / PI - 1.0).abs() < 1e-5), "{e:?}");
+        }
+    }
+
+    #[test]
+    fn linear_radiance_has_its_closed_form() {
+        // L(ω) = 1 + ω·z: E(n) = π + (2π/3) n·z.
+        let (capture, out) = (32, 8);
+        let kernel = Kernel::cosine(capture, out);
+        let radiance: Vec<Vec3> = (0..capture * capture)
+            .map(|t| Vec3::splat(1.0 + texel_direction(t % capture, t / capture, capture).z))
+            .collect();
+        let mut e = vec![Vec3::ZERO; out * out];
+        kernel.irradiance(&radiance, &mut e);
+        for (o, e) in e.iter().enumerate() {
+            let z = texel_direction(o % out, o / out, out).z;
+            let exact = PI * (1.0 + 2.0 / 3.0 * z);
+            // Texels of 0.1 rad, midpoint value: relative error about 0.1²/24.
+            assert!((e.x - exact).abs() < 5e-3, "texel {o}: {} instead of {exact}", e.x);
+        }
+    }
+
+    #[test]
+    fn distance_moments_of_two_shells() {
+        // Distance 1 on one half of the sphere and 3 on the other: at the pole of a half, the mean is 1 and the
+        // variance nearly 0; at the rim it is 2 and 1.
+        let (capture, out) = (32, 15);
+        let texels: Vec<Moments> = (0..capture * capture)
+            .map(|t| {
+                let mut m = Moments::default();
+                m.add(if texel_direction(t % capture, t / capture, capture).x > 0.0 { 1.0 } else { 3.0 }, 1.0);
+                m
+            })
+            .collect();
+        let filtered = Kernel::lobe(capture, out, 50.0).distance(&texels);
+        // Row 7 of 15 runs through the pole along x; column 7 is the pole +Z, on the rim between the halves.
+        let (rim, pole) = (&filtered[7 * 15 + 7], &filtered[7 * 15 + 14]);
+        assert!((rim.mean() - 2.0).abs() < 1e-3 && (rim.variance() - 1.0).abs() < 1e-3, "{rim:?}");
+        assert!((pole.mean() - 1.0).abs() < 1e-3 && pole.variance() < 1e-2, "{pole:?}");
+    }
+}

@@ -1,0 +1,229 @@
+//! The uniform grid of probes.
+//!
+//! Probe (x, y, z) has the index `x + nx·(y + ny·z)` and lies at `origin + (x, y, z)·spacing` before relocation.
+
+use glam::{DVec3, UVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::scene::Scene;
+
+/// Index of a probe in the file's tensors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ProbeIndex(pub u32);
+
+/// Cells along the longest side of the bounds where neither spacing nor divisions are given.
+const DEFAULT_CELLS: f64 = 16.0;
+
+/// More probes than this are taken for a slip of the spacing.
+pub const MAX_PROBES: u64 = 1 << 26;
+
+/// The volume of scenes without extent along all axes, metres per side.
+const POINT_SCENE_SIZE_M: f64 = 1.0;
+
+/// What the user may say about the grid.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "snake_case")]
+pub struct GridSettings {
+    /// Box that the probes must cover, world space, metres; the scene's bounding box where not given.
+    pub bounds: Option<Bounds>,
+    /// Distance between neighbours, metres, the same along all axes.
+    pub spacing_m: Option<f64>,
+    /// Number of probes along x, y and z; excludes `spacing_m`.
+    pub divisions: Option<(u32, u32, u32)>,
+    /// Margin around the scene's own bounding box as a share of the spacing, so that hits on its walls stay inside.
+    pub padding: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bounds {
+    pub min: (f64, f64, f64),
+    pub max: (f64, f64, f64),
+}
+
+impl Default for GridSettings {
+    fn default() -> Self {
+        GridSettings { bounds: None, spacing_m: None, divisions: None, padding: 0.05 }
+    }
+}
+
+/// Why there is no such grid. Each message names the setting.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum GridError {
+    #[error("grid.spacing_m is {0}: it must be a positive number of metres")]
+    Spacing(f64),
+    #[error("grid.divisions is {0:?}: every axis needs at least one probe")]
+    Divisions((u32, u32, u32)),
+    #[error("grid.spacing_m and grid.divisions are both given: remove one")]
+    Both,
+    #[error("grid.padding is {0}: it must be a number from 0 to 1")]
+    Padding(f64),
+    #[error("grid.bounds: min {min} must be finite and not above max {max}")]
+    Bounds { min: DVec3, max: DVec3 },
+    #[error("the grid would have {0} probes, more than 2^26: raise grid.spacing_m or lower grid.divisions")]
+    TooMany(u64),
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    /// Probe (0,0,0) in world space, metres: what positions in the file are relative to.
+    pub origin_world: DVec3,
+    /// The same relative to the scene's origin.
+    pub origin: Vec3,
+    /// Metres along each axis.
+    pub spacing: Vec3,
+    /// Probes along each axis, at least one.
+    pub divisions: UVec3,
+}
+
+/// The eight probes around a point. Along an axis with a single layer, both are the same and the second weighs 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cell {
+    /// Lowest corner.
+    pub base: UVec3,
+    /// Place within the cell, each in [0,1].
+    pub fraction: Vec3,
+}
+
+impl Grid {
+    pub fn new(settings: &GridSettings, scene: &Scene) -> Result<Grid, GridError> {
+        if settings.spacing_m.is_some() && settings.divisions.is_some() {
+            return Err(GridError::Both);
+        }
+        if !(0.0..=1.0).contains(&settings.padding) {
+            return Err(GridError::Padding(settings.padding));
+        }
+        // Relative to the scene's origin, so that a moved scene gives the same grid bit by bit.
+        let (low, high) = match settings.bounds {
+            Some(bounds) => {
+                let (min, max) = (DVec3::from(bounds.min), DVec3::from(bounds.max));
+                if !(min.is_finite() && max.is_finite() && min.cmple(max).all()) {
+                    return Err(GridError::Bounds { min, max });
+                }
+                (min - scene.origin_world, max - scene.origin_world)
+            }
+            None => scene_bounds(scene),
+        };
+        let padding = if settings.bounds.is_some() { 0.0 } else { settings.padding };
+        let (spacing, divisions) = match (settings.spacing_m, settings.divisions) {
+            (_, Some(divisions)) => {
+                if divisions.0 == 0 || divisions.1 == 0 || divisions.2 == 0 {
+                    return Err(GridError::Divisions(divisions));
+                }
+                spread(high - low, UVec3::from(divisions), padding)
+            }
+            (Some(spacing), None) => {
+                if !(spacing > 0.0 && spacing.is_finite()) {
+                    return Err(GridError::Spacing(spacing));
+                }
+                cover(high - low, spacing, padding)?
+            }
+            (None, None) => {
+                let spacing = (high - low).max_element() / DEFAULT_CELLS;
+                cover(high - low, spacing, padding)?
+            }
+        };
+        let count = divisions.to_array().iter().map(|&n| u64::from(n)).product();
+        if count > MAX_PROBES {
+            return Err(GridError::TooMany(count));
+        }
+        let origin = (low + high) / 2.0 - spacing * (divisions - UVec3::ONE).as_dvec3() / 2.0;
+        Ok(Grid {
+            origin_world: scene.origin_world + origin,
+            origin: origin.as_vec3(),
+            spacing: spacing.as_vec3(),
+            divisions,
+        })
+    }
+
+    pub fn probe_count(&self) -> usize {
+        self.divisions.to_array().iter().map(|&n| n as usize).product()
+    }
+
+    /// Cells along each axis; a single layer of probes makes one layer of cells.
+    pub fn cells(&self) -> UVec3 {
+        (self.divisions - UVec3::ONE).max(UVec3::ONE)
+    }
+
+    pub fn cell_index(&self, base: UVec3) -> usize {
+        let n = self.cells().as_usizevec3();
+        let base = base.as_usizevec3();
+        base.x + n.x * (base.y + n.y * base.z)
+    }
+
+    pub fn coordinate(&self, probe: ProbeIndex) -> UVec3 {
+        let (nx, ny) = (self.divisions.x, self.divisions.y);
+        UVec3::new(probe.0 % nx, probe.0 / nx % ny, probe.0 / (nx * ny))
+    }
+
+    pub fn index(&self, coordinate: UVec3) -> ProbeIndex {
+        ProbeIndex(coordinate.x + self.divisions.x * (coordinate.y + self.divisions.y * coordinate.z))
+    }
+
+    /// Place of a probe before relocation, relative to `origin`.
+    pub fn position_in_grid(&self, probe: ProbeIndex) -> Vec3 {
+        self.coordinate(probe).as_vec3() * self.spacing
+    }
+
+    /// Grid coordinates of a point: probe (x,y,z) is at exactly (x,y,z).
+    pub fn grid_from_scene(&self, position: Vec3) -> Vec3 {
+        (position - self.origin) / self.spacing
+    }
+
+    /// Whether a point lies in the hull of the probes, within `tolerance` of a spacing.
+    pub fn contains(&self, position: Vec3, tolerance: f32) -> bool {
+        let g = self.grid_from_scene(position);
+        let last = (self.divisions - UVec3::ONE).as_vec3();
+        g.cmpge(Vec3::splat(-tolerance)).all() && g.cmple(last + tolerance).all()
+    }
+
+    /// The cell of a point; points outside use the nearest cell, at its face.
+    pub fn cell(&self, position: Vec3) -> Cell {
+        let g = self.grid_from_scene(position);
+        // `as` saturates and sends NaN to 0: any point has a cell.
+        let base = g.floor().max(Vec3::ZERO).as_uvec3().min(self.cells() - UVec3::ONE);
+        let layered = (self.divisions.min(UVec3::splat(2)) - UVec3::ONE).as_vec3();
+        Cell { base, fraction: (g - base.as_vec3()).clamp(Vec3::ZERO, Vec3::ONE) * layered }
+    }
+
+    /// Corner `i` of a cell: bit 0 is +x, bit 1 is +y, bit 2 is +z.
+    pub fn corner(&self, base: UVec3, i: u32) -> ProbeIndex {
+        let step = UVec3::new(i & 1, i >> 1 & 1, i >> 2 & 1);
+        self.index((base + step).min(self.divisions - UVec3::ONE))
+    }
+
+    /// Largest spacing, metres: what relative lengths refer to.
+    pub fn spacing_max(&self) -> f32 {
+        self.spacing.max_element()
+    }
+}
+
+/// The scene's box; scenes that are flat or empty get some depth.
+fn scene_bounds(scene: &Scene) -> (DVec3, DVec3) {
+    let (low, high) = scene.mesh.bounds().unwrap_or((Vec3::ZERO, Vec3::ZERO));
+    let (low, high) = (low.as_dvec3(), high.as_dvec3());
+    if high == low {
+        let half = DVec3::splat(POINT_SCENE_SIZE_M / 2.0);
+        return (low - half, high + half);
+    }
+    (low, high)
+}
+
+/// Enough probes at this spacing that their hull covers the extent and the padding, as many on either side.
+fn cover(extent: DVec3, spacing: f64, padding: f64) -> Result<(DVec3, UVec3), GridError> {
+    let cells = (extent / spacing + 2.0 * padding).ceil().max(DVec3::ONE);
+    if cells.max_element() > MAX_PROBES as f64 {
+        return Err(GridError::TooMany(cells.max_element() as u64));
+    }
+    Ok((DVec3::splat(spacing), cells.as_uvec3() + UVec3::ONE))
+}
+
+/// The spacing at which so many probes cover the extent and the padding.
+fn spread(extent: DVec3, divisions: UVec3, padding: f64) -> (DVec3, UVec3) {
+    let cells = (divisions - UVec3::ONE).as_dvec3();
+    let room = (cells - 2.0 * padding).max(DVec3::splat(0.5));
+    // A single layer needs a spacing too, for what is measured in spacings; so do axes along which the scene is flat.
+    let layered = DVec3::select(divisions.cmpgt(UVec3::ONE), extent / room, extent);
+    let fallback = layered.max_element().max(f64::MIN_POSITIVE);
+    (DVec3::select(layered.cmpgt(DVec3::splat(fallback * 1e-6)), layered, DVec3::splat(fallback)), divisions)
+}

@@ -1,0 +1,315 @@
+//! Visibility measured where it is asked for: at the surfaces.
+//!
+//! Depth maps answer "is there something between this probe and that point" by comparing distances, and err where
+//! depth changes within a texel: behind thin walls and around every edge. But the points that ask lie on surfaces that
+//! are known. So every cell is divided into n³ voxels, and for each voxel that a surface passes through, and each of the
+//! six main directions that the surface faces there, rays to the cell's eight probes decide which of them are visible:
+//! one bit each. The two faces of a wall have entries of their own however thin it is.
+//!
+//! Storage: `key = voxel·6 + facing` (u16, voxel = x + n·(y + n·z), facing = 2·axis + (1 where negative)), sorted
+//! within each cell, with the mask (u8, bit i = corner i) beside it; `cell_start[c]..cell_start[c + 1]` are cell c's.
+
+use glam::{UVec3, Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::grid::Grid;
+use super::overlap::triangle_meets_box;
+use super::placement::ProbeState;
+use crate::math::random::{Purpose, Random};
+use crate::scene::{Mesh, Scene, TriangleIndex};
+use crate::trace::offset::ray_offset;
+use crate::trace::{Ray, Tracer};
+
+/// Points tried on a surface within one voxel, at first and where these disagree.
+const FIRST_POINTS: u32 = 2;
+const MORE_POINTS: u32 = 6;
+
+/// Most voxels per cell and axis: 22³·6 keys fit 16 bits.
+pub const MAX_VOXELS_PER_CELL: u32 = 22;
+
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SurfaceVisibility {
+    pub voxels_per_cell: u32,
+    /// One more than there are cells.
+    pub cell_start: Vec<u32>,
+    pub keys: Vec<u16>,
+    pub masks: Vec<u8>,
+}
+
+/// Rays that say "visible", per corner, out of `points`.
+#[derive(Debug, Clone, Copy, Default)]
+struct Tally {
+    points: u32,
+    visible: [u32; 8],
+    /// Whether the outside of a surface faces here (as against the back of one that has only a front).
+    outside: bool,
+}
+
+impl SurfaceVisibility {
+    /// Which of the eight corners of its cell a surface point sees. All of them where nothing is known.
+    pub fn mask(&self, grid: &Grid, position: Vec3, geometric_normal: Vec3) -> u8 {
+        let cell = grid.cell(position);
+        let n = self.voxels_per_cell;
+        let voxel = voxel_of(cell.fraction, n);
+        let key = key(voxel, facing(geometric_normal), n);
+        let index = grid.cell_index(cell.base);
+        let range = self.cell_start[index] as usize..self.cell_start[index + 1] as usize;
+        let (keys, masks) = (&self.keys[range.clone()], &self.masks[range]);
+        match keys.binary_search(&key) {
+            Ok(found) => masks[found],
+            Err(_) => nearest_entry(keys, key, n).map_or(u8::MAX, |found| masks[found]),
+        }
+    }
+
+    /// Measures every surface within the grid's hull.
+    pub fn measure(
+        scene: &Scene,
+        tracer: &Tracer,
+        grid: &Grid,
+        states: &[ProbeState],
+        positions: &[Vec3],
+        voxels_per_cell: u32,
+        seed: u64,
+    ) -> (SurfaceVisibility, u64) {
+        let survey = Survey { scene, tracer, grid, states, positions, n: voxels_per_cell, seed };
+        let mut entries: Vec<(u32, u16, Tally)> =
+            (0..scene.mesh.triangles.len() as u32).into_par_iter().flat_map_iter(|t| survey.triangle(t)).collect();
+        // Sums of counts do not depend on the order, so neither does the result.
+        entries.par_sort_unstable_by_key(|e| (e.0, e.1));
+        let rays = entries.iter().map(|e| u64::from(e.2.points) * 8).sum();
+        let mut table = SurfaceVisibility { voxels_per_cell, ..Default::default() };
+        let cells: usize = grid.cells().to_array().iter().map(|&n| n as usize).product();
+        let mut groups = entries.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).peekable();
+        for cell in 0..cells as u32 {
+            table.cell_start.push(table.keys.len() as u32);
+            while let Some(group) = groups.next_if(|g| g[0].0 == cell) {
+                let mask = majority(group);
+                // The inside of a solid, which nothing sees and nothing asks for.
+                if mask == 0 && !group.iter().any(|e| e.2.outside) {
+                    continue;
+                }
+                table.keys.push(group[0].1);
+                table.masks.push(mask);
+            }
+        }
+        table.cell_start.push(table.keys.len() as u32);
+        (table, rays)
+    }
+}
+
+fn majority(group: &[(u32, u16, Tally)]) -> u8 {
+    let points: u32 = group.iter().map(|e| e.2.points).sum();
+    (0..8).fold(0, |mask, i| {
+        let visible: u32 = group.iter().map(|e| e.2.visible[i]).sum();
+        mask | u8::from(2 * visible > points) << i
+    })
+}
+
+fn voxel_of(fraction: Vec3, n: u32) -> UVec3 {
+    (fraction * n as f32).as_uvec3().min(UVec3::splat(n - 1))
+}
+
+fn key(voxel: UVec3, facing: u32, n: u32) -> u16 {
+    ((voxel.x + n * (voxel.y + n * voxel.z)) * 6 + facing) as u16
+}
+
+/// Main direction of a normal: 2·axis + (1 where negative).
+fn facing(normal: Vec3) -> u32 {
+    let axis = normal.abs().max_position() as u32;
+    2 * axis + u32::from(normal[axis as usize] < 0.0)
+}
+
+/// The entry that faces the same way in the nearest voxel, else any in the same voxel.
+fn nearest_entry(keys: &[u16], wanted: u16, n: u32) -> Option<usize> {
+    let voxel = |key: u16| {
+        let v = u32::from(key) / 6;
+        UVec3::new(v % n, v / n % n, v / (n * n)).as_ivec3()
+    };
+    let target = voxel(wanted);
+    (0..keys.len())
+        .filter(|&i| keys[i] % 6 == wanted % 6)
+        .min_by_key(|&i| voxel(keys[i]).distance_squared(target))
+        .or_else(|| keys.iter().position(|k| k / 6 == wanted / 6))
+}
+
+struct Survey<'a> {
+    scene: &'a Scene,
+    tracer: &'a Tracer<'a>,
+    grid: &'a Grid,
+    states: &'a [ProbeState],
+    positions: &'a [Vec3],
+    n: u32,
+    seed: u64,
+}
+
+impl Survey<'_> {
+    fn mesh(&self) -> &Mesh {
+        &self.scene.mesh
+    }
+
+    /// Tallies of both sides of a triangle, in every voxel that it meets.
+    fn triangle(&self, triangle: u32) -> Vec<(u32, u16, Tally)> {
+        let mut out = Vec::new();
+        let corners = self.mesh().corners(TriangleIndex(triangle));
+        let in_grid = corners.map(|p| self.grid.grid_from_scene(p));
+        let cells = self.grid.cells();
+        let low = in_grid[0].min(in_grid[1]).min(in_grid[2]);
+        let high = in_grid[0].max(in_grid[1]).max(in_grid[2]);
+        if high.cmplt(Vec3::ZERO).any() || low.cmpgt(cells.as_vec3()).any() {
+            return out;
+        }
+        let last = cells - UVec3::ONE;
+        let first = low.floor().max(Vec3::ZERO).as_uvec3().min(last);
+        let past = high.floor().max(Vec3::ZERO).as_uvec3().min(last);
+        for z in first.z..=past.z {
+            for y in first.y..=past.y {
+                for x in first.x..=past.x {
+                    let base = UVec3::new(x, y, z);
+                    let local = in_grid.map(|c| c - base.as_vec3());
+                    if triangle_meets_box(local.map(|c| c - 0.5), Vec3::splat(0.5)) {
+                        self.cell(triangle, &corners, &local, base, &mut out);
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// One triangle in one cell; `local` are its corners in units of the cell.
+    fn cell(
+        &self,
+        triangle: u32,
+        corners: &[Vec3; 3],
+        local: &[Vec3; 3],
+        base: UVec3,
+        out: &mut Vec<(u32, u16, Tally)>,
+    ) {
+        let active: u8 = (0..8).fold(0, |mask, i| {
+            let probe = self.grid.corner(base, i).0 as usize;
+            mask | u8::from(self.states[probe] == ProbeState::Active) << i
+        });
+        if active == 0 {
+            return;
+        }
+        let n = self.n as f32;
+        let scaled = local.map(|c| c * n);
+        let low = scaled[0].min(scaled[1]).min(scaled[2]).floor().max(Vec3::ZERO).as_uvec3();
+        let high = scaled[0].max(scaled[1]).max(scaled[2]).floor().max(Vec3::ZERO).as_uvec3();
+        let last = UVec3::splat(self.n - 1);
+        let (low, high) = (low.min(last), high.min(last));
+        let outward = self.mesh().geometric_normal(TriangleIndex(triangle));
+        let double_sided = self.scene.material(TriangleIndex(triangle)).double_sided;
+        let cell_index = self.grid.cell_index(base) as u32;
+        for z in low.z..=high.z {
+            for y in low.y..=high.y {
+                for x in low.x..=high.x {
+                    let voxel = UVec3::new(x, y, z);
+                    let centre = voxel.as_vec3() + 0.5;
+                    let around = scaled.map(|c| c - centre);
+                    if !triangle_meets_box(around, Vec3::splat(0.5)) {
+                        continue;
+                    }
+                    let stream = u64::from(cell_index) << 16 | u64::from(key(voxel, 0, self.n));
+                    for (side, normal) in [(0u64, outward), (1, -outward)] {
+                        let mut random =
+                            Random::new(self.seed, Purpose::SurfaceVisibility, stream, 2 * u64::from(triangle) + side);
+                        let mut tally = self.tally(corners, &around, normal, base, active, &mut random);
+                        tally.outside = side == 0 || double_sided;
+                        out.push((cell_index, key(voxel, facing(normal), self.n), tally));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Rays from points of the triangle within a voxel; `around` are its corners relative to the voxel's centre.
+    fn tally(
+        &self,
+        corners: &[Vec3; 3],
+        around: &[Vec3; 3],
+        normal: Vec3,
+        base: UVec3,
+        active: u8,
+        random: &mut Random,
+    ) -> Tally {
+        let mut tally = Tally::default();
+        for i in 0..FIRST_POINTS + MORE_POINTS {
+            if i == FIRST_POINTS && tally.visible.iter().all(|&v| v == 0 || v == tally.points) {
+                break;
+            }
+            let barycentric = point_in_voxel(around, random);
+            let position =
+                corners[0] + (corners[1] - corners[0]) * barycentric.x + (corners[2] - corners[0]) * barycentric.y;
+            let origin = position + normal * ray_offset(corners);
+            tally.points += 1;
+            for corner in 0..8 {
+                if active >> corner & 1 == 0 {
+                    continue;
+                }
+                let probe = self.positions[self.grid.corner(base, corner).0 as usize];
+                // A probe behind the surface is hidden by the surface itself.
+                if (probe - origin).dot(normal) > 0.0
+                    && !self.tracer.occluded(Ray::segment(probe, origin, random.bits()))
+                {
+                    tally.visible[corner as usize] += 1;
+                }
+            }
+        }
+        tally
+    }
+}
+
+/// Barycentric coordinates of a random point of a triangle inside the unit box around the origin; where chance finds
+/// none (slivers, corners), of the triangle's point nearest the box's centre, which lies in the box as they overlap.
+fn point_in_voxel(around: &[Vec3; 3], random: &mut Random) -> Vec2 {
+    /// Tries before a triangle's share of a voxel counts as a sliver.
+    const TRIES: usize = 8;
+    let (e1, e2) = (around[1] - around[0], around[2] - around[0]);
+    let normal = e1.cross(e2);
+    let axis = normal.abs().max_position();
+    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+    let determinant = e1[u] * e2[v] - e1[v] * e2[u];
+    for _ in 0..TRIES {
+        let p = Vec2::new(random.uniform() - 0.5 - around[0][u], random.uniform() - 0.5 - around[0][v]);
+        let b = Vec2::new(p.x * e2[v] - p.y * e2[u], e1[u] * p.y - e1[v] * p.x) / determinant;
+        let along_axis = around[0][axis] + e1[axis] * b.x + e2[axis] * b.y;
+        if b.x >= 0.0 && b.y >= 0.0 && b.x + b.y <= 1.0 && along_axis.abs() <= 0.5 {
+            return b;
+        }
+    }
+    nearest_to_origin(around)
+}
+
+/// Barycentric coordinates of the point of a triangle nearest the origin (Ericson, *Real-Time Collision Detection*,
+/// 2005, section 5.1.5).
+fn nearest_to_origin(t: &[Vec3; 3]) -> Vec2 {
+    let (ab, ac, ap) = (t[1] - t[0], t[2] - t[0], -t[0]);
+    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return Vec2::ZERO;
+    }
+    let bp = -t[1];
+    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return Vec2::X;
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return Vec2::new(d1 / (d1 - d3), 0.0);
+    }
+    let cp = -t[2];
+    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return Vec2::Y;
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return Vec2::new(0.0, d2 / (d2 - d6));
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
+        let w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return Vec2::new(1.0 - w, w);
+    }
+    Vec2::new(vb, vc) / (va + vb + vc)
+}

@@ -1,0 +1,99 @@
+//! Looking textures up.
+
+use std::sync::LazyLock;
+
+use glam::{Vec2, Vec4};
+
+use super::material::{Texels, Texture, Wrap};
+use crate::math::color::linear_from_srgb;
+
+/// Linear value of every 8-bit sRGB code.
+static LINEAR_FROM_SRGB8: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|code| linear_from_srgb(code as f32 / 255.0)));
+
+impl Texture {
+    /// Linear RGBA of one texel, indices in range.
+    pub fn texel(&self, x: u32, y: u32) -> Vec4 {
+        let i = y as usize * self.width as usize + x as usize;
+        match &self.texels {
+            Texels::Rgba32F(data) => data[i],
+            Texels::Rgba8 { data, srgb } => {
+                let [r, g, b, a] = data[i];
+                let unit = |code: u8| f32::from(code) * (1.0 / 255.0);
+                if *srgb {
+                    let linear = |code: u8| LINEAR_FROM_SRGB8[code as usize];
+                    Vec4::new(linear(r), linear(g), linear(b), unit(a))
+                } else {
+                    Vec4::new(unit(r), unit(g), unit(b), unit(a))
+                }
+            }
+        }
+    }
+
+    /// Linear RGBA at `uv`, bilinear (nearest where the sampler says so). There are no mip levels: rays are many.
+    pub fn sample(&self, uv: Vec2) -> Vec4 {
+        if self.width == 1 && self.height == 1 {
+            return self.texel(0, 0);
+        }
+        let size = Vec2::new(self.width as f32, self.height as f32);
+        if self.nearest {
+            let p = (uv * size).floor();
+            return self.texel(self.wrapped(0, p.x), self.wrapped(1, p.y));
+        }
+        let p = uv * size - 0.5;
+        let corner = p.floor();
+        let f = p - corner;
+        let x = [self.wrapped(0, corner.x), self.wrapped(0, corner.x + 1.0)];
+        let y = [self.wrapped(1, corner.y), self.wrapped(1, corner.y + 1.0)];
+        let top = self.texel(x[0], y[0]).lerp(self.texel(x[1], y[0]), f.x);
+        let bottom = self.texel(x[0], y[1]).lerp(self.texel(x[1], y[1]), f.x);
+        top.lerp(bottom, f.y)
+    }
+
+    /// Texel index along `axis` of an integral coordinate that may lie outside.
+    fn wrapped(&self, axis: usize, coordinate: f32) -> u32 {
+        let size = if axis == 0 { self.width } else { self.height };
+        // `as` saturates and sends NaN to 0, so hostile texture coordinates stay in range.
+        let i = coordinate as i64;
+        let n = i64::from(size);
+        let wrapped = match self.wrap[axis] {
+            Wrap::Repeat => i.rem_euclid(n),
+            Wrap::ClampToEdge => i.clamp(0, n - 1),
+            Wrap::MirroredRepeat => {
+                let twice = i.rem_euclid(2 * n);
+                if twice < n { twice } else { 2 * n - 1 - twice }
+            }
+        };
+        wrapped as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(wrap: Wrap, nearest: bool) -> Texture {
+        let texels = Texels::Rgba32F([0.0f32, 1.0, 2.0, 3.0].map(Vec4::splat).to_vec());
+        Texture { width: 4, height: 1, wrap: [wrap, wrap], nearest, texels }
+    }
+
+    #[test]
+    fn wrap_modes_continue_the_image() {
+        let at = |wrap, u: f32| row(wrap, true).sample(Vec2::new(u, 0.5)).x;
+        assert_eq!(at(Wrap::Repeat, 1.1), 0.0);
+        assert_eq!(at(Wrap::Repeat, -0.1), 3.0);
+        assert_eq!(at(Wrap::MirroredRepeat, 1.1), 3.0);
+        assert_eq!(at(Wrap::MirroredRepeat, -0.3), 1.0);
+        assert_eq!(at(Wrap::ClampToEdge, 7.0), 3.0);
+        assert_eq!(at(Wrap::ClampToEdge, -7.0), 0.0);
+        assert!(at(Wrap::Repeat, f32::NAN).is_finite());
+        assert!(at(Wrap::MirroredRepeat, f32::INFINITY).is_finite());
+    }
+
+    #[test]
+    fn bilinear_meets_texel_centres_and_middles() {
+        let t = row(Wrap::Repeat, false);
+        assert_eq!(t.sample(Vec2::new(0.375, 0.5)).x, 1.0);
+        assert_eq!(t.sample(Vec2::new(0.5, 0.5)).x, 1.5);
+    }
+}

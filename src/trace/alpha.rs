@@ -1,0 +1,58 @@
+//! Alpha tests: rays pass MASK and BLEND surfaces where the texture, or chance, says so.
+
+use std::ffi::c_void;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use embree4_sys::RTCFilterFunctionNArguments;
+use glam::Vec2;
+
+use crate::math::random::hash_to_unit;
+use crate::scene::{Scene, TriangleIndex};
+
+// Places of the fields in Embree's ray and hit packets of size one (rtcore_ray.h), in words.
+const RAY_DIRECTION_X: usize = 4;
+const RAY_ID: usize = 10;
+const HIT_U: usize = 3;
+const HIT_V: usize = 4;
+const HIT_PRIMITIVE: usize = 5;
+
+/// Embree's filter callback: rejects a hit by clearing `valid`. The geometry's user pointer is the [`Scene`].
+///
+/// # Safety
+/// Called by Embree with packets of size one (the only ones this crate traces) and the user pointer that
+/// [`super::Tracer`] set, which outlives the geometry.
+pub unsafe extern "C" fn filter(arguments: *const RTCFilterFunctionNArguments) {
+    // SAFETY: Embree passes a valid argument block for the duration of the call.
+    let arguments = unsafe { &*arguments };
+    debug_assert_eq!(arguments.N, 1);
+    let (ray, hit) = (arguments.ray as *const u32, arguments.hit as *const u32);
+    // SAFETY: packets of size one are plain runs of 32-bit words; the indices above lie inside them.
+    let (salt, direction_bits, u, v, primitive) = unsafe {
+        (
+            *ray.add(RAY_ID),
+            *ray.add(RAY_DIRECTION_X) ^ (*ray.add(RAY_DIRECTION_X + 1)).rotate_left(11),
+            f32::from_bits(*hit.add(HIT_U)),
+            f32::from_bits(*hit.add(HIT_V)),
+            *hit.add(HIT_PRIMITIVE),
+        )
+    };
+    // SAFETY: `Tracer` set this pointer to a scene that it borrows for its whole life.
+    let scene = unsafe { &*(arguments.geometryUserPtr as *const Scene) };
+    // A panic must not unwind into Embree; none is expected, as the loader has checked every index.
+    let stopped = catch_unwind(AssertUnwindSafe(|| {
+        let triangle = TriangleIndex(scene.mesh.opaque_count as u32 + primitive);
+        let opacity = scene.opacity(triangle, Vec2::new(u, v));
+        // Chance by ray and triangle: the same whichever order Embree visits triangles in.
+        opacity > hash_to_unit(salt, direction_bits, primitive)
+    }))
+    .unwrap_or(true);
+    if !stopped {
+        // SAFETY: `valid` points to one word.
+        unsafe { *arguments.valid = 0 };
+    }
+}
+
+/// The user pointer that [`filter`] reads.
+pub fn user_pointer(scene: &Scene) -> *mut c_void {
+    std::ptr::from_ref(scene).cast_mut().cast()
+}

@@ -13,9 +13,13 @@
 //! | 6 edge | [`config`], [`plan`], [`cli`], [`commands`] | what was asked, what is done about it |
 #![deny(unsafe_code)]
 
+pub mod config;
 pub mod light;
 pub mod math;
 pub mod output;
 pub mod probe;
 pub mod scene;
 pub mod trace;
+pub mod bake;
+pub mod plan;
+pub mod progress;

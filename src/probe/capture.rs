@@ -247,6 +247,15 @@ impl Capture<'_, '_> {
 }
 
 impl ProbeCapture {
+    /// Memory that it takes.
+    pub fn bytes(&self) -> u64 {
+        (self.surfels.capacity() * size_of::<Surfel>()
+            + self.emitted.capacity() * size_of::<Vec3>()
+            + self.emitter_samples.capacity() * size_of::<(Vec3, Vec3)>()
+            + self.distances.capacity() * size_of::<Moments>()
+            + size_of::<ProbeCapture>()) as u64
+    }
+
     /// Irradiance around `normal` from the emitters sampled at the probe's centre, W·m⁻².
     pub fn sampled_emitter_irradiance(&self, normal: Vec3) -> Vec3 {
         self.emitter_samples.iter().map(|(direction, light)| *light * normal.dot(*direction).max(0.0)).sum()

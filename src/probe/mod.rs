@@ -9,6 +9,7 @@ pub mod encode;
 pub mod file;
 pub mod filter;
 pub mod grid;
+pub mod layout;
 pub mod map;
 pub mod overlap;
 pub mod placement;

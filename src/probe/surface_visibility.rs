@@ -61,6 +61,25 @@ impl SurfaceVisibility {
         }
     }
 
+    /// Whether no entry hides an active probe: then the table says nothing.
+    pub fn all_visible(&self, grid: &Grid, states: &[ProbeState]) -> bool {
+        let cells = grid.cells();
+        let base = |c: usize| {
+            let (nx, ny) = (cells.x as usize, cells.y as usize);
+            UVec3::new((c % nx) as u32, (c / nx % ny) as u32, (c / (nx * ny)) as u32)
+        };
+        (0..self.cell_start.len().saturating_sub(1)).all(|c| {
+            let range = self.cell_start[c] as usize..self.cell_start[c + 1] as usize;
+            let active = active_corners(grid, states, base(c));
+            self.masks[range].iter().all(|mask| mask & active == active)
+        })
+    }
+
+    /// Bytes of its tensors.
+    pub fn bytes(&self) -> u64 {
+        (self.cell_start.len() * 4 + self.keys.len() * 3) as u64
+    }
+
     /// Measures every surface within the grid's hull.
     pub fn measure(
         scene: &Scene,
@@ -132,6 +151,14 @@ fn nearest_entry(keys: &[u16], wanted: u16, n: u32) -> Option<usize> {
         .or_else(|| keys.iter().position(|k| k / 6 == wanted / 6))
 }
 
+/// Bit i: whether corner i of the cell is an active probe.
+fn active_corners(grid: &Grid, states: &[ProbeState], base: UVec3) -> u8 {
+    (0..8).fold(0, |mask, i| {
+        let probe = grid.corner(base, i).0 as usize;
+        mask | u8::from(states[probe] == ProbeState::Active) << i
+    })
+}
+
 struct Survey<'a> {
     scene: &'a Scene,
     tracer: &'a Tracer<'a>,
@@ -184,10 +211,7 @@ impl Survey<'_> {
         base: UVec3,
         out: &mut Vec<(u32, u16, Tally)>,
     ) {
-        let active: u8 = (0..8).fold(0, |mask, i| {
-            let probe = self.grid.corner(base, i).0 as usize;
-            mask | u8::from(self.states[probe] == ProbeState::Active) << i
-        });
+        let active = active_corners(self.grid, self.states, base);
         if active == 0 {
             return;
         }

@@ -10,7 +10,7 @@ mod ffi;
 pub mod offset;
 mod tracer;
 
-pub use tracer::{Hit, Ray, Tracer};
+pub use tracer::{Hit, Ray, RayLog, Tracer};
 
 /// Why no rays can be traced.
 #[derive(Debug, thiserror::Error)]

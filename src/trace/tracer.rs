@@ -1,6 +1,8 @@
 //! The scene as Embree sees it, and the two questions asked of it.
 
+use std::cell::RefCell;
 use std::marker::PhantomData;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use embree4_rs::Device;
 use embree4_rs::geometry::{Geometry, TriangleMeshGeometry};
@@ -67,6 +69,8 @@ pub struct Tracer<'s> {
     handle: sys::RTCScene,
     /// First triangle of each geometry.
     first_triangle: [u32; 2],
+    /// Set while rays are logged for [`Tracer::replay`].
+    recording: AtomicBool,
     /// Released after the scene handle: `Drop` below runs before the fields'.
     _device: Device,
     _scene: PhantomData<&'s Scene>,
@@ -95,6 +99,7 @@ impl<'s> Tracer<'s> {
         let tracer = Tracer {
             handle,
             first_triangle: [0, scene.mesh.opaque_count as u32],
+            recording: AtomicBool::new(false),
             _device: device,
             _scene: PhantomData,
         };
@@ -138,6 +143,7 @@ impl<'s> Tracer<'s> {
     /// The nearest surface along the ray that stops it.
     #[inline]
     pub fn closest(&self, ray: Ray) -> Option<Hit> {
+        self.log(Question::Closest, ray);
         let mut ray_hit = RayHit::new(ray.to_embree());
         // SAFETY: committed in `build`, immutable since.
         unsafe { ffi::intersect(self.handle, &mut ray_hit) };
@@ -156,8 +162,74 @@ impl<'s> Tracer<'s> {
     /// Whether any surface stops the ray within `t_max`.
     #[inline]
     pub fn occluded(&self, ray: Ray) -> bool {
+        self.log(Question::Occluded, ray);
         // SAFETY: committed in `build`, immutable since.
         unsafe { ffi::occluded(self.handle, &mut AlignedRay(ray.to_embree())) }
+    }
+}
+
+/// Rays as they were asked, for measuring what Embree alone takes for them.
+#[derive(Debug, Clone, Copy)]
+enum Question {
+    Closest,
+    Occluded,
+}
+
+/// The rays that one call of [`Tracer::record`] asked, in order.
+#[derive(Debug, Clone, Default)]
+pub struct RayLog(Vec<(Question, Ray)>);
+
+impl RayLog {
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+thread_local! {
+    static LOG: RefCell<Vec<(Question, Ray)>> = const { RefCell::new(Vec::new()) };
+}
+
+impl Tracer<'_> {
+    /// Turns logging on or off, for all threads.
+    pub fn set_recording(&self, on: bool) {
+        self.recording.store(on, Ordering::SeqCst);
+    }
+
+    #[inline]
+    fn log(&self, question: Question, ray: Ray) {
+        if self.recording.load(Ordering::Relaxed) {
+            LOG.with_borrow_mut(|log| log.push((question, ray)));
+        }
+    }
+
+    /// Runs `work` on this thread and returns the rays that it asked while recording was on.
+    pub fn record(&self, work: impl FnOnce()) -> RayLog {
+        LOG.take();
+        work();
+        RayLog(LOG.take())
+    }
+
+    /// Asks Embree the logged rays again and does nothing with the answers.
+    pub fn replay(&self, log: &RayLog) {
+        for (question, ray) in &log.0 {
+            // SAFETY: committed in `build`, immutable since.
+            unsafe {
+                match question {
+                    Question::Closest => {
+                        let mut ray_hit = RayHit::new(ray.to_embree());
+                        ffi::intersect(self.handle, &mut ray_hit);
+                        std::hint::black_box(ray_hit.base.ray.tfar);
+                    }
+                    Question::Occluded => {
+                        std::hint::black_box(ffi::occluded(self.handle, &mut AlignedRay(ray.to_embree())));
+                    }
+                }
+            }
+        }
     }
 }
 

@@ -1,0 +1,165 @@
+//! What a bake computes for this scene, and what it leaves out because the scene does not need it.
+//!
+//! Every line says what, why, and what it saved. Leaving out never changes the result: `plan: keep_everything` computes
+//! and stores all of it, and a test compares.
+
+use serde::Serialize;
+
+use crate::config::{Config, PlanMode};
+use crate::light::World;
+use crate::probe::Grid;
+use crate::probe::placement::{Placement, ProbeState};
+use crate::probe::query::VisibilitySettings;
+use crate::probe::surface_visibility::SurfaceVisibility;
+use crate::scene::{AlphaMode, Environment, Scene};
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Line {
+    pub stage: &'static str,
+    pub kept: bool,
+    pub reason: String,
+    /// Of the probe file or, for images, of memory; `null` where not known.
+    pub saved_bytes: Option<u64>,
+    /// Estimate; `null` where not known.
+    pub saved_s: Option<f64>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    pub lines: Vec<Line>,
+    /// Whether the visibility factor can differ from 1 for any surface.
+    pub visibility: bool,
+}
+
+impl Plan {
+    /// Decides from the scene, the configuration and what placement and the survey of the surfaces found.
+    pub fn new(
+        world: &World,
+        config: &Config,
+        grid: &Grid,
+        placement: &Placement,
+        survey: Option<&SurfaceVisibility>,
+    ) -> Plan {
+        let scene = world.scene;
+        let mut lines = vec![
+            punctual(scene),
+            emission(world),
+            sky(scene),
+            alpha(scene),
+            textures(scene),
+            glossy(scene),
+            unsampled(config, placement),
+        ];
+        let blocked = survey.is_none_or(|s| !s.all_visible(grid, &placement.states));
+        let visibility = blocked && config.query.visibility != VisibilitySettings::None;
+        lines.push(visibility_line(config, grid, survey, visibility));
+        if config.plan == PlanMode::KeepEverything {
+            for line in lines.iter_mut().filter(|l| !l.kept) {
+                line.reason = format!("kept by configuration; {}", line.reason);
+                (line.kept, line.saved_bytes, line.saved_s) = (true, None, None);
+            }
+        }
+        Plan { lines, visibility }
+    }
+
+    /// The plan's line about bounces, known only afterwards.
+    pub fn add_bounces(&mut self, done: u32, most: u32, converged: bool, bounces_s: f64) {
+        let saved = most.saturating_sub(done);
+        let per_bounce = bounces_s / f64::from(done.max(1));
+        self.lines.push(Line {
+            stage: "bounces",
+            kept: !(converged && saved > 0),
+            reason: if converged {
+                format!("{done} bounces; what the others would add is below the tolerance")
+            } else {
+                format!("all {most} bounces; the tolerance was not reached")
+            },
+            saved_bytes: None,
+            saved_s: (converged && saved > 0).then_some(per_bounce * f64::from(saved)),
+        });
+    }
+}
+
+fn line(stage: &'static str, kept: bool, reason: impl Into<String>) -> Line {
+    Line { stage, kept, reason: reason.into(), saved_bytes: None, saved_s: None }
+}
+
+fn punctual(scene: &Scene) -> Line {
+    match scene.lights.len() {
+        0 => line("punctual_shadow_rays", false, "the scene has no punctual light"),
+        n => line("punctual_shadow_rays", true, format!("{n} punctual light(s)")),
+    }
+}
+
+fn emission(world: &World) -> Line {
+    match world.emitters.triangle_count() {
+        0 => line("emissive_surfaces", false, "no surface emits"),
+        n => line("emissive_surfaces", true, format!("{n} emissive triangle(s)")),
+    }
+}
+
+fn sky(scene: &Scene) -> Line {
+    match &scene.environment {
+        environment if environment.is_black() => line("sky", false, "there is no sky"),
+        Environment::Map(map) => line("sky", true, format!("an environment map of {}×{}", map.width, map.height)),
+        _ => line("sky", true, "a constant sky"),
+    }
+}
+
+fn alpha(scene: &Scene) -> Line {
+    let tested = scene.mesh.triangles.len() - scene.mesh.opaque_count;
+    let blended = scene.materials.iter().filter(|m| m.alpha_mode == AlphaMode::Blend).count();
+    match tested {
+        0 => line("alpha_test", false, "every surface is opaque"),
+        n => line("alpha_test", true, format!("{n} triangle(s) with an alpha test, {blended} blended material(s)")),
+    }
+}
+
+fn textures(scene: &Scene) -> Line {
+    let constant = scene.textures.iter().filter(|t| t.width == 1 && t.height == 1).count();
+    let fetched = scene.textures.len() - constant;
+    let collapsed = match constant {
+        0 => String::new(),
+        n => format!(", {n} constant one(s) reduced to one texel"),
+    };
+    match fetched {
+        0 => line("textures", false, format!("no texture that varies{collapsed}")),
+        n => line("textures", true, format!("{n} texture(s){collapsed}")),
+    }
+}
+
+/// No method so far stores radiance; the line is there because its readers look for it.
+fn glossy(scene: &Scene) -> Line {
+    let glossy = scene.materials.iter().filter(|m| !m.unlit && (m.metallic > 0.0 || m.roughness < 1.0)).count();
+    let reason = match glossy {
+        0 => "no glossy material".to_owned(),
+        n => format!("{n} glossy material(s), but the method stores irradiance only"),
+    };
+    line("radiance_levels", false, reason)
+}
+
+fn unsampled(config: &Config, placement: &Placement) -> Line {
+    let count = |state| placement.states.iter().filter(|&&s| s == state).count();
+    let unsampled = count(ProbeState::NeverSampled);
+    let inside = count(ProbeState::InsideGeometry);
+    let reason = format!("{unsampled} probe(s) that no surface can sample, {inside} inside geometry");
+    line("unused_probes", unsampled + inside == 0 || config.placement.keep_unsampled && inside == 0, reason)
+}
+
+fn visibility_line(config: &Config, grid: &Grid, survey: Option<&SurfaceVisibility>, needed: bool) -> Line {
+    let stage = "visibility";
+    if config.query.visibility == VisibilitySettings::None {
+        return line(stage, false, "the method has none");
+    }
+    if needed {
+        return line(stage, true, "some surfaces do not see all probes around them");
+    }
+    let bytes = match config.query.visibility {
+        VisibilitySettings::Moments { .. } => {
+            let side = config.filter.distance_resolution + 2 * config.encoding.border;
+            (grid.probe_count() * (side * side * 4 + 4)) as u64
+        }
+        _ => survey.map_or(0, SurfaceVisibility::bytes),
+    };
+    Line { saved_bytes: Some(bytes), ..line(stage, false, "every surface sees all probes around it") }
+}

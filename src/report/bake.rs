@@ -1,0 +1,84 @@
+//! The report of a bake, as JSON.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::plan::Line;
+use crate::probe::solver::Bounce;
+
+/// Version of the report's layout.
+pub const SCHEMA: &str = "lightprobe-bake/1";
+
+#[derive(Debug, Clone, Serialize)]
+pub struct BakeReport {
+    pub schema: &'static str,
+    pub version: &'static str,
+    pub command: &'static str,
+    pub seed: u64,
+    pub threads: usize,
+    pub scene_blake3: String,
+    /// Effective configuration, RON.
+    pub config: String,
+    pub probes: usize,
+    pub probes_active: usize,
+    pub rays: Rays,
+    pub time_s: Times,
+    /// (primary + shadow) ÷ `time_s.capture`.
+    pub rays_per_s: Option<f64>,
+    /// The same rays replayed bare in the same order, with `--measure-raw`.
+    pub raw_embree_rays_per_s: Option<f64>,
+    pub peak_memory_bytes: u64,
+    pub bytes_per_probe: BytesPerProbe,
+    pub bounces: Vec<Bounce>,
+    pub converged: bool,
+    pub spectral_radius_estimate: Option<f64>,
+    pub numerics: Numerics,
+    pub plan: Vec<Line>,
+}
+
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Rays {
+    pub primary: u64,
+    pub shadow: u64,
+    /// Rays that classified the probes and surveyed visibility at the surfaces.
+    pub survey: u64,
+}
+
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Times {
+    pub load: f64,
+    pub accel_build: f64,
+    /// Classifying probes and surveying visibility at the surfaces.
+    pub survey: f64,
+    pub capture: f64,
+    pub bounces: f64,
+    pub filter: f64,
+    pub encode: f64,
+    pub write: f64,
+    pub total: f64,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct BytesPerProbe {
+    /// The method's GPU layout in full, borders included.
+    pub runtime: f64,
+    /// The same after the plan.
+    pub runtime_kept: f64,
+    /// File size ÷ probes.
+    pub file: f64,
+    pub tensors: BTreeMap<String, u64>,
+}
+
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Numerics {
+    pub non_finite: u64,
+    /// Values outside the storage format's range, per tensor.
+    pub clamped: BTreeMap<String, u64>,
+    pub variance_floor_hits: u64,
+    pub hits_outside_volume: u64,
+    pub probes_inside_geometry: usize,
+    pub dropped_triangles: u64,
+    /// Materials whose albedo exceeds `solver.albedo_max` somewhere and is clamped.
+    pub albedo_clamped: u64,
+}

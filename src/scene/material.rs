@@ -14,7 +14,9 @@ pub struct TextureIndex(pub u32);
 pub enum AlphaMode {
     Opaque,
     /// Rays pass where alpha is below `cutoff`.
-    Mask { cutoff: f32 },
+    Mask {
+        cutoff: f32,
+    },
     /// Rays pass with probability 1 − alpha.
     Blend,
 }
@@ -50,7 +52,7 @@ pub struct TextureRef {
     pub texture_from_uv: Mat3,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Wrap {
     Repeat,
     MirroredRepeat,

@@ -23,3 +23,4 @@ pub mod trace;
 pub mod bake;
 pub mod plan;
 pub mod progress;
+pub mod report;

@@ -52,7 +52,7 @@ pub struct TextureRef {
     pub texture_from_uv: Mat3,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Wrap {
     Repeat,
     MirroredRepeat,

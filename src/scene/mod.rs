@@ -5,17 +5,23 @@
 
 pub mod camera;
 pub mod environment;
+mod error;
 pub mod light;
+mod load;
 mod lookup;
 pub mod material;
 pub mod mesh;
+mod options;
 mod texture;
 
 pub use camera::Camera;
 pub use environment::Environment;
+pub use error::SceneError;
 pub use light::{LightKind, PunctualLight};
-pub use material::{AlphaMode, Material, MaterialIndex, Texture, TextureIndex, TextureRef};
+pub use load::load;
+pub use material::{AlphaMode, Material, MaterialIndex, Texels, Texture, TextureIndex, TextureRef, Wrap};
 pub use mesh::{Mesh, TriangleIndex};
+pub use options::{EnvironmentSource, EnvironmentSourceError, LoadOptions};
 
 use glam::DVec3;
 

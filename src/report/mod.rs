@@ -1,0 +1,3 @@
+//! Figures and pictures for people and machines.
+
+pub mod bake;

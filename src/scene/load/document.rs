@@ -1,0 +1,187 @@
+//! The glTF JSON, taken apart element by element so that a message can name the element that is wrong.
+//!
+//! The types are the `gltf` crate's. Its own validation and readers are not used: validation panics on a POSITION
+//! accessor that does not exist and refuses files that only lack `min`/`max`; the readers trust the counts they find.
+//! Instead every index is looked up with a check where it is followed, so what nothing refers to cannot fail a load.
+
+use std::path::{Path, PathBuf};
+
+use gltf::json::extensions::scene::khr_lights_punctual::Light;
+use gltf::json::{
+    Accessor, Buffer, Camera, Image, Index, Material, Mesh, Node, Skin, Texture, buffer::View, texture::Sampler,
+};
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+
+use super::extensions;
+use crate::scene::error::{RE_EXPORT, SceneError};
+
+/// No real scene comes near; a JSON list of `{}` grows a hundredfold when parsed into typed elements.
+const MAX_ELEMENTS: usize = 1 << 20;
+
+pub(super) struct Document {
+    /// The scene file, for messages.
+    pub file: PathBuf,
+    pub nodes: Vec<Node>,
+    pub meshes: Vec<Mesh>,
+    pub accessors: Vec<Accessor>,
+    pub views: Vec<View>,
+    pub buffers: Vec<Buffer>,
+    pub materials: Vec<Material>,
+    pub textures: Vec<Texture>,
+    pub images: Vec<Image>,
+    pub samplers: Vec<Sampler>,
+    pub cameras: Vec<Camera>,
+    pub skins: Vec<Skin>,
+    pub lights: Vec<Light>,
+    /// Root nodes of each scene.
+    pub scenes: Vec<Vec<usize>>,
+    pub default_scene: Option<usize>,
+}
+
+impl Document {
+    /// Parses the JSON and refuses versions and required extensions that the loader does not know.
+    pub fn parse(file: &Path, json: &[u8], warnings: &mut Vec<String>) -> Result<Document, SceneError> {
+        let format = |what: String, remedy| SceneError::Format { file: file.to_owned(), what, remedy };
+        let root: Value = serde_json::from_slice(json)
+            .map_err(|e| format(format!("its JSON does not parse: {e}"), "give a .gltf or .glb file"))?;
+        let Value::Object(mut root) = root else {
+            return Err(format("its JSON is not an object".to_owned(), "give a .gltf or .glb file"));
+        };
+        let version = root.get("asset").and_then(|asset| asset.get("version")).and_then(Value::as_str);
+        match version {
+            Some(version) if version.starts_with("2.") => {}
+            Some(version) => {
+                let version = version.escape_debug();
+                return Err(format(
+                    format!("asset.version is '{version}', but only 2.x is read"),
+                    "convert it with `gltf-pipeline -i IN.gltf -o OUT.glb`",
+                ));
+            }
+            None => return Err(format("asset.version is missing".to_owned(), RE_EXPORT)),
+        }
+        extensions::check_required(file, &root, warnings)?;
+
+        let mut sections = Sections { file, root: &mut root };
+        let scenes = sections.take::<SceneRoots>("scenes")?;
+        Ok(Document {
+            file: file.to_owned(),
+            nodes: sections.take("nodes")?,
+            meshes: sections.take("meshes")?,
+            accessors: sections.take("accessors")?,
+            views: sections.take("bufferViews")?,
+            buffers: sections.take("buffers")?,
+            materials: sections.take("materials")?,
+            textures: sections.take("textures")?,
+            images: sections.take("images")?,
+            samplers: sections.take("samplers")?,
+            cameras: sections.take("cameras")?,
+            skins: sections.take("skins")?,
+            lights: sections.take_lights()?,
+            scenes: scenes.into_iter().map(|s| s.nodes.into_iter().map(|n| n as usize).collect()).collect(),
+            default_scene: sections.default_scene()?,
+        })
+    }
+
+    /// An error about what is wrong at `place`.
+    pub fn invalid(&self, place: impl Into<String>, what: impl Into<String>, remedy: &'static str) -> SceneError {
+        SceneError::Invalid { file: self.file.clone(), place: place.into(), what: what.into(), remedy }
+    }
+
+    /// The element that `place` refers to, or an error that it does not exist.
+    pub fn get<'a, T>(
+        &self,
+        list: &'a [T],
+        kind: &str,
+        index: Index<T>,
+        place: &dyn std::fmt::Display,
+    ) -> Result<&'a T, SceneError> {
+        list.get(index.value()).ok_or_else(|| {
+            let what = format!("refers to {kind} {index}, but the file has {}", list.len());
+            self.invalid(place.to_string(), what, RE_EXPORT)
+        })
+    }
+}
+
+/// `kind index 'name'`, safe to print on one line.
+pub(super) fn label(kind: &str, index: usize, name: Option<&str>) -> String {
+    match name {
+        None | Some("") => format!("{kind} {index}"),
+        Some(name) => format!("{kind} {index} '{}'", short(name)),
+    }
+}
+
+/// A name as it may stand in a one-line message.
+pub(super) fn short(name: &str) -> String {
+    const MAX_CHARS: usize = 60;
+    let cut: String = name.chars().take(MAX_CHARS).collect();
+    let dots = if cut.len() < name.len() { "…" } else { "" };
+    format!("{}{dots}", cut.escape_debug())
+}
+
+#[derive(serde::Deserialize)]
+struct SceneRoots {
+    /// Absent in files of some exporters, although `gltf::json` requires it.
+    #[serde(default)]
+    nodes: Vec<u32>,
+}
+
+/// The root object while its lists are taken out of it.
+struct Sections<'a> {
+    file: &'a Path,
+    root: &'a mut Map<String, Value>,
+}
+
+impl Sections<'_> {
+    fn take<T: DeserializeOwned>(&mut self, key: &str) -> Result<Vec<T>, SceneError> {
+        match self.root.remove(key) {
+            None => Ok(Vec::new()),
+            Some(value) => self.elements(key, value),
+        }
+    }
+
+    fn take_lights(&mut self) -> Result<Vec<Light>, SceneError> {
+        const PLACE: &str = "extensions.KHR_lights_punctual.lights";
+        let lights = self.root.get_mut("extensions").and_then(|e| e.get_mut("KHR_lights_punctual"));
+        match lights.and_then(|l| l.get_mut("lights")).map(Value::take) {
+            None => Ok(Vec::new()),
+            Some(value) => self.elements(PLACE, value),
+        }
+    }
+
+    fn default_scene(&self) -> Result<Option<usize>, SceneError> {
+        match self.root.get("scene") {
+            None => Ok(None),
+            Some(value) => match value.as_u64().and_then(|index| usize::try_from(index).ok()) {
+                Some(index) => Ok(Some(index)),
+                None => Err(self.invalid("scene".to_owned(), "is not an index".to_owned())),
+            },
+        }
+    }
+
+    fn elements<T: DeserializeOwned>(&self, key: &str, value: Value) -> Result<Vec<T>, SceneError> {
+        let Value::Array(list) = value else {
+            return Err(self.invalid(key.to_owned(), "is not a list".to_owned()));
+        };
+        if list.len() > MAX_ELEMENTS {
+            return Err(SceneError::TooLarge {
+                file: self.file.to_owned(),
+                place: key.to_owned(),
+                what: format!("{} elements, more than the {MAX_ELEMENTS} that are read", list.len()),
+                remedy: "merge or instance them",
+            });
+        }
+        let parse = |(index, value)| {
+            serde_json::from_value(value).map_err(|e| self.invalid(format!("{key}[{index}]"), one_line(&e)))
+        };
+        list.into_iter().enumerate().map(parse).collect()
+    }
+
+    fn invalid(&self, place: String, what: String) -> SceneError {
+        SceneError::Invalid { file: self.file.to_owned(), place, what, remedy: RE_EXPORT }
+    }
+}
+
+fn one_line(error: &serde_json::Error) -> String {
+    short(&error.to_string()).replace("\\\"", "\"").replace("\\'", "'")
+}

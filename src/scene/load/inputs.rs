@@ -1,0 +1,124 @@
+//! Reading the files of a scene; every byte read goes into the scene's hash.
+
+use std::borrow::Cow;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use base64::Engine as _;
+use base64::alphabet;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use percent_encoding::percent_decode_str;
+
+/// Files read so far, and the hash over them in the order of reading.
+pub(super) struct Inputs {
+    hasher: blake3::Hasher,
+    /// Bytes of all files read: what a damaged header's counts are held against.
+    pub bytes: u64,
+}
+
+/// Where a glTF `uri` leads.
+pub(super) enum Resource {
+    /// The content of a data URI; part of the scene file's bytes already.
+    Data(Vec<u8>),
+    File(PathBuf),
+}
+
+impl Inputs {
+    pub fn new() -> Self {
+        Inputs { hasher: blake3::Hasher::new(), bytes: 0 }
+    }
+
+    /// The whole of a regular file. Devices and pipes are refused: `/dev/zero` never ends.
+    pub fn read(&mut self, path: &Path) -> io::Result<Vec<u8>> {
+        if !fs::metadata(path)?.is_file() {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
+        }
+        let bytes = fs::read(path)?;
+        self.add(&bytes);
+        Ok(bytes)
+    }
+
+    /// Takes bytes that did not come from a file into the hash, after their length so that no two inputs run together.
+    pub fn add(&mut self, bytes: &[u8]) {
+        self.hasher.update(&(bytes.len() as u64).to_le_bytes());
+        self.hasher.update(bytes);
+        self.bytes += bytes.len() as u64;
+    }
+
+    /// BLAKE3 in hex.
+    pub fn finish(&self) -> String {
+        self.hasher.finalize().to_hex().to_string()
+    }
+}
+
+/// Padding is optional and stray low bits are let through: exporters differ, and nothing is lost by it.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &alphabet::STANDARD,
+    GeneralPurposeConfig::new()
+        .with_decode_padding_mode(DecodePaddingMode::Indifferent)
+        .with_decode_allow_trailing_bits(true),
+);
+
+/// Resolves a glTF `uri` against the folder of the scene file. The error says what is wrong with the URI.
+pub(super) fn resolve(uri: &str, folder: &Path) -> Result<Resource, String> {
+    if let Some(rest) = uri.strip_prefix("data:") {
+        let Some((kind, content)) = rest.split_once(',') else {
+            return Err("a data URI without a comma".to_owned());
+        };
+        let plain: Cow<[u8]> = percent_decode_str(content).into();
+        return match kind.ends_with(";base64") {
+            true => BASE64.decode(&plain).map(Resource::Data).map_err(|e| format!("a data URI of bad base64 ({e})")),
+            false => Ok(Resource::Data(plain.into_owned())),
+        };
+    }
+    if let Some((scheme, _)) = uri.split_once("://") {
+        return Err(format!("a URI of scheme '{}', not a relative path", scheme.escape_debug()));
+    }
+    let decoded = percent_decode_str(uri).decode_utf8().map_err(|_| "a URI that is not UTF-8".to_owned())?;
+    if decoded.is_empty() || decoded.contains('\0') {
+        return Err("an empty or malformed URI".to_owned());
+    }
+    // Some exporters forget to encode: a literal '%' in a file's name.
+    let (encoded, decoded) = (folder.join(uri), folder.join(&*decoded));
+    Ok(Resource::File(if !decoded.exists() && encoded.exists() { encoded } else { decoded }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn data(uri: &str) -> Option<Vec<u8>> {
+        match resolve(uri, Path::new(".")) {
+            Ok(Resource::Data(bytes)) => Some(bytes),
+            _ => None,
+        }
+    }
+
+    #[test]
+    fn data_uris() {
+        assert_eq!(data("data:application/octet-stream;base64,AQID"), Some(vec![1, 2, 3]));
+        assert_eq!(data("data:;base64,AQ"), Some(vec![1]));
+        assert_eq!(data("data:;base64,AQ=="), Some(vec![1]));
+        assert_eq!(data("data:,a%20b"), Some(b"a b".to_vec()));
+        assert_eq!(data("data:;base64,*"), None);
+        assert_eq!(data("data:nothing"), None);
+    }
+
+    #[test]
+    fn paths_are_percent_decoded() {
+        assert!(matches!(resolve("a%20b.bin", Path::new("/d")), Ok(Resource::File(p)) if p == Path::new("/d/a b.bin")));
+        assert!(resolve("https://example.com/a.bin", Path::new("/d")).is_err());
+        assert!(resolve("", Path::new("/d")).is_err());
+    }
+
+    #[test]
+    fn the_hash_keeps_inputs_apart() {
+        let hash = |parts: &[&[u8]]| {
+            let mut inputs = Inputs::new();
+            parts.iter().for_each(|p| inputs.add(p));
+            inputs.finish()
+        };
+        assert_ne!(hash(&[b"ab", b"c"]), hash(&[b"a", b"bc"]));
+    }
+}

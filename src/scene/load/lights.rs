@@ -1,0 +1,192 @@
+//! Punctual lights and cameras where their nodes stand. Both keep their size whatever the nodes' scale is.
+
+use std::collections::HashSet;
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+
+use glam::{DVec3, Mat3, Vec3};
+use gltf::json::extensions::scene::khr_lights_punctual::{Light, Type};
+use gltf::json::validation::Checked;
+use gltf::json::{Camera as CameraDefinition, camera::Type as CameraType};
+
+use super::document::{Document, label, short};
+use super::nodes::{Nodes, node_label};
+use super::transform::{Pose, WorldPoint};
+use crate::scene::camera::Projection;
+use crate::scene::error::{RE_EXPORT, SceneError};
+use crate::scene::{Camera, LightKind, PunctualLight};
+
+/// Where stored positions are relative to: `centre` from the landmark.
+pub(super) struct Origin<'a> {
+    pub landmark: &'a WorldPoint,
+    pub centre: DVec3,
+}
+
+impl Origin<'_> {
+    fn position(&self, pose: &Pose) -> Vec3 {
+        // + 0.0 turns −0 into +0, as for vertices.
+        ((pose.offset - self.centre) + DVec3::ZERO).as_vec3()
+    }
+}
+
+/// `KHR_lights_punctual` lights of the visible nodes.
+pub(super) fn lights(
+    document: &Document,
+    nodes: &Nodes,
+    origin: &Origin,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<PunctualLight>, SceneError> {
+    let mut lights = Vec::new();
+    for &index in &nodes.visible {
+        let node = &document.nodes[index];
+        let Some(reference) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) else { continue };
+        let light = document.get(&document.lights, "light", reference.light, &node_label(document, index))?;
+        let place = label("light", reference.light.value(), light.name.as_deref());
+        let pose = nodes.placements[index].relative_to(origin.landmark);
+        let position = origin.position(&pose);
+        if !position.is_finite() {
+            return Err(document.invalid(place, "it is infinitely far from the scene", "move it closer"));
+        }
+        let name = node.name.as_deref().or(light.name.as_deref());
+        lights.push(PunctualLight {
+            name: name.map_or_else(|| format!("light {}", lights.len()), short),
+            kind: kind(document, light, &pose, position, &place, warnings)?,
+            intensity: intensity(document, light, &place, warnings)?,
+        });
+    }
+    Ok(lights)
+}
+
+fn intensity(document: &Document, light: &Light, place: &str, warnings: &mut Vec<String>) -> Result<Vec3, SceneError> {
+    let intensity = Vec3::from_array(light.color) * light.intensity;
+    if !intensity.is_finite() {
+        return Err(document.invalid(place, "its color × intensity is not finite", "correct the light"));
+    }
+    if intensity.min_element() < 0.0 {
+        warnings.push(format!("{place}: negative intensity is set to 0"));
+    }
+    Ok(intensity.max(Vec3::ZERO))
+}
+
+fn kind(
+    document: &Document,
+    light: &Light,
+    pose: &Pose,
+    position: Vec3,
+    place: &str,
+    warnings: &mut Vec<String>,
+) -> Result<LightKind, SceneError> {
+    let direction = (pose.linear * DVec3::NEG_Z).normalize_or(DVec3::NEG_Z).as_vec3();
+    let range_m = match light.range {
+        Some(range) if range > 0.0 => range,
+        Some(range) => {
+            warnings.push(format!("{place}: range {range} is not positive and counts as infinite"));
+            f32::INFINITY
+        }
+        None => f32::INFINITY,
+    };
+    match light.type_ {
+        Checked::Valid(Type::Directional) => Ok(LightKind::Directional { direction }),
+        Checked::Valid(Type::Point) => Ok(LightKind::Point { position, range_m }),
+        Checked::Valid(Type::Spot) => {
+            let (inner, outer) = match &light.spot {
+                Some(spot) => (spot.inner_cone_angle, spot.outer_cone_angle),
+                None => (0.0, FRAC_PI_4),
+            };
+            if !inner.is_finite() || !outer.is_finite() || outer <= 0.0 {
+                return Err(document.invalid(place, "its cone angles are not positive numbers", "correct the light"));
+            }
+            let outer_cone_rad = outer.min(FRAC_PI_2);
+            let inner_cone_rad = inner.clamp(0.0, outer_cone_rad);
+            if (inner_cone_rad, outer_cone_rad) != (inner, outer) {
+                warnings.push(format!("{place}: cone angles are clamped to 0 ≤ inner ≤ outer ≤ π/2"));
+            }
+            Ok(LightKind::Spot { position, direction, range_m, inner_cone_rad, outer_cone_rad })
+        }
+        Checked::Invalid => Err(document.invalid(place, "its type is none of the extension's", RE_EXPORT)),
+    }
+}
+
+/// Cameras of the visible nodes, with names made unique. One that cannot be used is left out with a warning: bakes do
+/// without.
+pub(super) fn cameras(
+    document: &Document,
+    nodes: &Nodes,
+    origin: &Origin,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Camera>, SceneError> {
+    let mut cameras: Vec<Camera> = Vec::new();
+    let mut taken = HashSet::new();
+    for &index in &nodes.visible {
+        let node = &document.nodes[index];
+        let Some(camera_index) = node.camera else { continue };
+        let definition = document.get(&document.cameras, "camera", camera_index, &node_label(document, index))?;
+        let pose = nodes.placements[index].relative_to(origin.landmark);
+        let position = origin.position(&pose);
+        let frame = frame(&pose).filter(|_| position.is_finite());
+        let (Some(world_from_camera), Some(projection)) = (frame, projection(definition)) else {
+            let place = label("camera", camera_index.value(), definition.name.as_deref());
+            warnings.push(format!("{place} is left out: its projection or its node's transform is not valid"));
+            continue;
+        };
+        let name = [&node.name, &definition.name].into_iter().flatten().find(|name| !name.is_empty());
+        let name = unique(name.map_or_else(|| cameras.len().to_string(), |name| short(name)), &mut taken);
+        cameras.push(Camera { name, position, world_from_camera, projection });
+    }
+    Ok(cameras)
+}
+
+/// The name, or the first of `name#2`, `name#3`, … that is free.
+fn unique(name: String, taken: &mut HashSet<String>) -> String {
+    let mut candidate = name.clone();
+    let mut number = 1;
+    while !taken.insert(candidate.clone()) {
+        number += 1;
+        candidate = format!("{name}#{number}");
+    }
+    candidate
+}
+
+/// Right, up, back of the node, made orthonormal; `None` where the transform leaves no view direction or no up.
+fn frame(pose: &Pose) -> Option<Mat3> {
+    let back = pose.linear.z_axis.try_normalize()?;
+    let right = pose.linear.y_axis.try_normalize()?.cross(back).try_normalize()?;
+    Some(Mat3::from_cols(right.as_vec3(), back.cross(right).as_vec3(), back.as_vec3()))
+}
+
+fn projection(definition: &CameraDefinition) -> Option<Projection> {
+    match definition.type_ {
+        Checked::Valid(CameraType::Perspective) => {
+            let fov_y_rad = definition.perspective.as_ref()?.yfov;
+            (fov_y_rad > 0.0 && fov_y_rad < PI).then_some(Projection::Perspective { fov_y_rad })
+        }
+        Checked::Valid(CameraType::Orthographic) => {
+            let half_height_m = definition.orthographic.as_ref()?.ymag.abs();
+            (half_height_m > 0.0 && half_height_m.is_finite()).then_some(Projection::Orthographic { half_height_m })
+        }
+        Checked::Invalid => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DMat3;
+
+    use super::*;
+
+    #[test]
+    fn repeated_names_are_numbered() {
+        let mut taken = HashSet::new();
+        let names = ["a", "a", "a#2", "b", "a"].map(|n| unique(n.to_owned(), &mut taken));
+        assert_eq!(names, ["a", "a#2", "a#2#2", "b", "a#3"]);
+    }
+
+    #[test]
+    fn camera_frames_are_right_handed_and_orthonormal() {
+        for linear in [DMat3::IDENTITY, DMat3::from_diagonal(DVec3::new(-2.0, 3.0, 4.0)), DMat3::from_rotation_x(0.3)] {
+            let frame = frame(&Pose { linear, offset: DVec3::ZERO }).expect("a frame");
+            assert!((frame.determinant() - 1.0).abs() < 1e-6);
+            assert!(frame.mul_mat3(&frame.transpose()).abs_diff_eq(Mat3::IDENTITY, 1e-6));
+        }
+        assert!(frame(&Pose { linear: DMat3::ZERO, offset: DVec3::ZERO }).is_none());
+    }
+}

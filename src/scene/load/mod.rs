@@ -1,0 +1,124 @@
+//! From a glTF file to a [`Scene`]: container → JSON → buffers → nodes → meshes → materials → one pool of triangles.
+//!
+//! Nothing in a file is believed before it is checked, and nothing is allocated on the word of its header.
+
+mod accessor;
+mod buffers;
+mod container;
+mod document;
+mod draws;
+mod environment;
+mod extensions;
+mod flatten;
+mod image;
+mod inputs;
+mod lights;
+mod materials;
+mod nodes;
+mod places;
+mod primitive;
+mod texture_slot;
+mod textures;
+mod transform;
+
+use std::path::Path;
+
+use self::buffers::Buffers;
+use self::document::Document;
+use self::draws::Draws;
+use self::flatten::{Flattened, flatten};
+use self::inputs::Inputs;
+use self::lights::Origin;
+use self::materials::Materials;
+use self::nodes::Nodes;
+use self::primitive::Skipped;
+use self::textures::Textures;
+use self::transform::world_point;
+use super::error::SceneError;
+use super::options::LoadOptions;
+use super::{DroppedTriangles, Scene};
+
+/// Loads a `.gltf` or `.glb` file with its buffers, its images and the sky.
+///
+/// # Errors
+///
+/// Every [`SceneError`] names file, place and remedy. What only makes a scene poorer than it was meant (skins at rest,
+/// unmodelled material layers, dropped triangles) is in [`Scene::warnings`] instead.
+pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
+    let mut warnings = Vec::new();
+    let mut inputs = Inputs::new();
+    let bytes = inputs.read(path).map_err(|cause| SceneError::Read {
+        file: path.to_owned(),
+        place: "scene".to_owned(),
+        cause,
+        remedy: "check the path; scenes are .gltf or .glb files",
+    })?;
+    let parts = container::split(&bytes).map_err(|what| SceneError::Format {
+        file: path.to_owned(),
+        what,
+        remedy: "copy or export the file again",
+    })?;
+    let document = Document::parse(path, &bytes[parts.json], &mut warnings)?;
+    let buffers = Buffers::load(&document, parts.bin.map(|bin| &bytes[bin]), &mut inputs)?;
+    let nodes = Nodes::build(&document, options.scene, &mut warnings)?;
+    let draws = Draws::collect(&document, &buffers, &nodes)?;
+    report_skipped(&draws.skipped, !draws.skeletons.is_empty(), &mut warnings);
+    let empty = |what: String| SceneError::Empty { file: path.to_owned(), what };
+    let Some(landmark) = draws.landmark() else {
+        return Err(empty("the scene has no triangles".to_owned()));
+    };
+
+    let mut textures = Textures::new(&document, &buffers, &mut inputs, options.collapse_constant_images);
+    let materials = Materials::load(&document, &draws, &mut textures, &mut warnings)?;
+    let textures = textures.textures;
+    let Flattened { mesh, centre, dropped } = flatten(&draws, &landmark, &materials);
+    report_dropped(&dropped, &mut warnings);
+    if mesh.triangles.is_empty() {
+        return Err(empty(format!("all of the scene's {} triangles are degenerate", dropped.total())));
+    }
+
+    let origin = Origin { landmark: &landmark, centre };
+    let lights = lights::lights(&document, &nodes, &origin, &mut warnings)?;
+    let cameras = lights::cameras(&document, &nodes, &origin, &mut warnings)?;
+    let environment = environment::load(options.environment.as_ref(), &mut inputs, &mut warnings)?;
+    Ok(Scene {
+        name: path.file_stem().map_or_else(|| "scene".to_owned(), |stem| stem.to_string_lossy().into_owned()),
+        origin_world: world_point(&landmark, centre),
+        mesh,
+        materials: materials.materials,
+        textures,
+        lights,
+        cameras,
+        environment,
+        blake3: inputs.finish(),
+        warnings,
+        dropped,
+    })
+}
+
+fn report_skipped(skipped: &Skipped, has_skins: bool, warnings: &mut Vec<String>) {
+    let mut warn = |count: usize, what: &str| {
+        if count > 0 {
+            warnings.push(format!("{count} {what}"));
+        }
+    };
+    warn(skipped.points_or_lines, "mesh primitives are points or lines and are left out");
+    warn(skipped.without_positions, "mesh primitives have no POSITION and are left out");
+    warn(skipped.incomplete_triangles, "mesh primitives end in an incomplete triangle, which is left out");
+    warn(skipped.morph_targets, "mesh primitives have morph targets; their base shape is loaded");
+    warn(skipped.more_influences, "mesh primitives have more than four joints to a vertex; the first four count");
+    if has_skins {
+        warnings.push("skinned meshes are loaded in the pose of their joints' nodes".to_owned());
+    }
+}
+
+fn report_dropped(dropped: &DroppedTriangles, warnings: &mut Vec<String>) {
+    if dropped.total() > 0 {
+        warnings.push(format!(
+            "{} triangles are dropped: {} not finite, {} without area",
+            dropped.total(),
+            dropped.non_finite,
+            dropped.zero_area
+        ));
+    }
+}

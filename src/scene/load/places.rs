@@ -1,0 +1,142 @@
+//! Where meshes stand: skins in their bind pose and GPU instances.
+
+use glam::{DMat3, DVec3};
+use gltf::json::{Accessor as AccessorDefinition, Index};
+use serde_json::Value;
+
+use super::accessor::Accessor;
+use super::buffers::Buffers;
+use super::document::{Document, label};
+use super::draws::{Draws, Place};
+use super::nodes::{Nodes, node_label};
+use super::primitive::Primitive;
+use super::transform::{Local, Placement, Pose, WorldPoint};
+use crate::scene::error::{RE_EXPORT, SceneError};
+
+/// Joint matrices at rest. The mesh node's own transform is not among them: glTF has joints place a skinned mesh.
+pub(super) fn skeleton(
+    document: &Document,
+    buffers: &Buffers,
+    nodes: &Nodes,
+    node: usize,
+    skin: Index<gltf::json::Skin>,
+) -> Result<Vec<Placement>, SceneError> {
+    let definition = document.get(&document.skins, "skin", skin, &node_label(document, node))?;
+    let place = label("skin", skin.value(), definition.name.as_deref());
+    if definition.joints.is_empty() {
+        return Err(document.invalid(place, "it has no joints", RE_EXPORT));
+    }
+    let inverse_binds = match definition.inverse_bind_matrices {
+        None => None,
+        Some(index) => {
+            let accessor = Accessor::resolve(document, buffers, index, &format!("{place}: inverseBindMatrices"))?;
+            accessor.expect_components(document, &[16])?;
+            if accessor.count < definition.joints.len() {
+                accessor.expect_count(document, definition.joints.len(), "its list of joints")?;
+            }
+            Some(accessor.floats([0.0; 16], false))
+        }
+    };
+    let mut joints = Vec::with_capacity(definition.joints.len());
+    for (number, &joint) in definition.joints.iter().enumerate() {
+        document.get(&document.nodes, "node", joint, &place)?;
+        let local = match &inverse_binds {
+            Some(matrices) => Local::from_matrix(&matrices[number]),
+            None => Local { linear: DMat3::IDENTITY, translation: DVec3::ZERO },
+        };
+        let matrix = nodes.placements[joint.value()].child(&local);
+        if !matrix.is_finite() {
+            let what = format!("the matrix of joint {number} is not finite");
+            return Err(document.invalid(place, what, "correct its inverse bind matrix"));
+        }
+        joints.push(matrix);
+    }
+    Ok(joints)
+}
+
+/// `EXT_mesh_gpu_instancing`: the node's transform × each instance's.
+pub(super) fn instances(
+    document: &Document,
+    buffers: &Buffers,
+    node_placement: &Placement,
+    node: usize,
+    extension: &Value,
+) -> Result<Vec<Place>, SceneError> {
+    let place = format!("{}: EXT_mesh_gpu_instancing", node_label(document, node));
+    let attribute = |name: &str, components: usize| -> Result<Option<Accessor>, SceneError> {
+        let Some(value) = extension.get("attributes").and_then(|a| a.get(name)) else { return Ok(None) };
+        let Some(index) = value.as_u64().and_then(|v| u32::try_from(v).ok()) else {
+            return Err(document.invalid(place.clone(), format!("{name} is not an index"), RE_EXPORT));
+        };
+        let index: Index<AccessorDefinition> = Index::new(index);
+        let accessor = Accessor::resolve(document, buffers, index, &format!("{place} {name}"))?;
+        accessor.expect_components(document, &[components])?;
+        Ok(Some(accessor))
+    };
+    let translations = attribute("TRANSLATION", 3)?;
+    let rotations = attribute("ROTATION", 4)?;
+    let scales = attribute("SCALE", 3)?;
+    let present = [&translations, &rotations, &scales];
+    let Some(count) = present.iter().find_map(|a| a.as_ref().map(|a| a.count)) else {
+        return Ok(vec![Place::Rigid(*node_placement)]);
+    };
+    for accessor in present.into_iter().flatten() {
+        accessor.expect_count(document, count, "the first instance attribute")?;
+    }
+    let translations = translations.map(|a| a.floats([0.0; 3], false));
+    let rotations = rotations.map(|a| a.floats([0.0; 4], false));
+    let scales = scales.map(|a| a.floats([0.0; 3], false));
+    let mut places = Vec::with_capacity(count);
+    for i in 0..count {
+        let placement = node_placement.child(&Local::from_trs(
+            translations.as_ref().map_or([0.0; 3], |t| t[i]),
+            rotations.as_ref().map_or([0.0, 0.0, 0.0, 1.0], |r| r[i]),
+            scales.as_ref().map_or([1.0; 3], |s| s[i]),
+        ));
+        if !placement.is_finite() {
+            let what = format!("the transform of instance {i} is not finite");
+            return Err(document.invalid(place, what, "correct its attributes"));
+        }
+        places.push(Place::Rigid(placement));
+    }
+    Ok(places)
+}
+
+/// The transform of one vertex: weighted joints, or the same pose for all.
+pub(super) enum Poses {
+    Rigid(Pose),
+    Skinned(Vec<Pose>),
+}
+
+impl Poses {
+    pub fn of(draws: &Draws, place: &Place, origin: &WorldPoint) -> Poses {
+        match place {
+            Place::Rigid(placement) => Poses::Rigid(placement.relative_to(origin)),
+            Place::Skinned(skeleton) => {
+                Poses::Skinned(draws.skeletons[*skeleton].iter().map(|joint| joint.relative_to(origin)).collect())
+            }
+        }
+    }
+
+    pub fn at(&self, primitive: &Primitive, vertex: usize) -> Pose {
+        let joints = match self {
+            Poses::Rigid(pose) => return *pose,
+            Poses::Skinned(joints) => joints,
+        };
+        let mut sum = Pose { linear: DMat3::ZERO, offset: DVec3::ZERO };
+        let mut total = 0.0;
+        for &(joint, weight) in &primitive.influences[vertex] {
+            if weight != 0.0 {
+                let (pose, weight) = (&joints[joint as usize], f64::from(weight));
+                sum.linear += pose.linear * weight;
+                sum.offset += pose.offset * weight;
+                total += weight;
+            }
+        }
+        // Weights ought to sum to 1 and miss it by rounding; a vertex without any follows the first joint.
+        if total == 0.0 {
+            return joints[0];
+        }
+        Pose { linear: sum.linear * (1.0 / total), offset: sum.offset / total }
+    }
+}

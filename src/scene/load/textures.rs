@@ -1,0 +1,189 @@
+//! Textures as materials refer to them: the image behind each, decoded once per use as colour or as data.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use gltf::json::texture::{MagFilter, Sampler, WrappingMode};
+use gltf::json::validation::Checked;
+use gltf::json::{Image, Index, Texture as Definition};
+
+use super::buffers::Buffers;
+use super::document::{Document, label};
+use super::extensions::{COMPRESSED_IMAGES, remedy};
+use super::image::{Budget, Decoded, Failure};
+use super::inputs::{Inputs, Resource, resolve};
+use crate::scene::error::{RE_EXPORT, SceneError};
+use crate::scene::material::{Texels, Texture, TextureIndex, Wrap};
+
+/// Textures loaded so far. What no material asks for is never read.
+pub(super) struct Textures<'a> {
+    document: &'a Document,
+    buffers: &'a Buffers<'a>,
+    inputs: &'a mut Inputs,
+    collapse_constant: bool,
+    budget: Budget,
+    /// Image files, read once even when decoded twice.
+    files: HashMap<usize, Vec<u8>>,
+    loaded: HashMap<Key, TextureIndex>,
+    pub textures: Vec<Texture>,
+    /// Whether each texture's alpha is below 1 anywhere, and its least value.
+    pub least_alpha: Vec<f32>,
+}
+
+/// Two uses that share these share their texels.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+struct Key {
+    image: usize,
+    wrap: [Wrap; 2],
+    nearest: bool,
+    srgb: bool,
+}
+
+impl<'a> Textures<'a> {
+    pub fn new(
+        document: &'a Document,
+        buffers: &'a Buffers<'a>,
+        inputs: &'a mut Inputs,
+        collapse_constant: bool,
+    ) -> Self {
+        Textures {
+            document,
+            buffers,
+            inputs,
+            collapse_constant,
+            budget: Budget::new(),
+            files: HashMap::new(),
+            loaded: HashMap::new(),
+            textures: Vec::new(),
+            least_alpha: Vec::new(),
+        }
+    }
+
+    /// The texture of that glTF index, as colours (`srgb`) or as data. `place` is the material slot that asks.
+    pub fn load(&mut self, texture: Index<Definition>, srgb: bool, place: &str) -> Result<TextureIndex, SceneError> {
+        let definition = self.document.get(&self.document.textures, "texture", texture, &place)?;
+        let place = format!("{place}: {}", label("texture", texture.value(), definition.name.as_deref()));
+        let image = self.image_of(definition, &place)?;
+        let (wrap, nearest) = self.sampling(definition, &place)?;
+        let key = Key { image: image.value(), wrap, nearest, srgb };
+        if let Some(index) = self.loaded.get(&key) {
+            return Ok(*index);
+        }
+        let Decoded { mut width, mut height, mut texels } = self.decode(image, srgb, &place)?;
+        if self.collapse_constant && is_constant(&texels) {
+            let bytes = match &mut texels {
+                Texels::Rgba8 { data, .. } => {
+                    data.truncate(1);
+                    data.shrink_to_fit();
+                    4
+                }
+                Texels::Rgba32F(data) => {
+                    data.truncate(1);
+                    data.shrink_to_fit();
+                    16
+                }
+            };
+            self.budget.release(u64::from(width) * u64::from(height), bytes);
+            (width, height) = (1, 1);
+        }
+        let index = TextureIndex(self.textures.len() as u32);
+        self.least_alpha.push(least_alpha(&texels));
+        self.textures.push(Texture { width, height, wrap, nearest, texels });
+        self.loaded.insert(key, index);
+        Ok(index)
+    }
+
+    /// The PNG or JPEG source, even where an extension offers another.
+    fn image_of(&self, definition: &Definition, place: &str) -> Result<Index<Image>, SceneError> {
+        // gltf::json gives a texture without a source this index.
+        if definition.source.value() != u32::MAX as usize {
+            return Ok(definition.source);
+        }
+        let others = definition.extensions.as_ref().map(|e| &e.others);
+        let found = COMPRESSED_IMAGES.iter().find(|&&e| others.is_some_and(|others| others.contains_key(e)));
+        Err(match found {
+            Some(extension) => self.unsupported(place, extension),
+            None => self.document.invalid(place, "it has no source image", RE_EXPORT),
+        })
+    }
+
+    fn unsupported(&self, place: &str, extension: &'static str) -> SceneError {
+        SceneError::Unsupported {
+            file: self.document.file.clone(),
+            place: place.to_owned(),
+            extension: extension.to_owned(),
+            remedy: remedy(extension),
+        }
+    }
+
+    fn sampling(&self, definition: &Definition, place: &str) -> Result<([Wrap; 2], bool), SceneError> {
+        let default = Sampler::default();
+        let sampler = match definition.sampler {
+            Some(index) => self.document.get(&self.document.samplers, "sampler", index, &place)?,
+            None => &default,
+        };
+        let wrap = |mode: &Checked<WrappingMode>| match mode {
+            Checked::Valid(WrappingMode::Repeat) => Ok(Wrap::Repeat),
+            Checked::Valid(WrappingMode::MirroredRepeat) => Ok(Wrap::MirroredRepeat),
+            Checked::Valid(WrappingMode::ClampToEdge) => Ok(Wrap::ClampToEdge),
+            Checked::Invalid => {
+                Err(self.document.invalid(place, "its sampler's wrap mode is none of glTF's", RE_EXPORT))
+            }
+        };
+        let nearest = sampler.mag_filter == Some(Checked::Valid(MagFilter::Nearest));
+        Ok(([wrap(&sampler.wrap_s)?, wrap(&sampler.wrap_t)?], nearest))
+    }
+
+    fn decode(&mut self, index: Index<Image>, srgb: bool, place: &str) -> Result<Decoded, SceneError> {
+        const REMEDY: &str = "give a PNG or JPEG image";
+        let document = self.document;
+        let image = document.get(&document.images, "image", index, &place)?;
+        let uri = image.uri.as_deref().filter(|uri| !uri.starts_with("data:"));
+        let name = image.name.as_deref().or(uri);
+        let place = format!("{place}: {}", label("image", index.value(), name));
+        let inline;
+        let bytes: &[u8] = match (&image.uri, image.buffer_view) {
+            (_, Some(view)) => self.buffers.view(document, view, &place)?.0,
+            (None, None) => return Err(document.invalid(place, "it has neither a uri nor a buffer view", RE_EXPORT)),
+            (Some(uri), None) => match resolve(uri, document.file.parent().unwrap_or(Path::new(""))) {
+                Ok(Resource::Data(bytes)) => {
+                    inline = bytes;
+                    &inline
+                }
+                Ok(Resource::File(path)) => {
+                    if !self.files.contains_key(&index.value()) {
+                        let bytes = self.inputs.read(&path).map_err(|cause| SceneError::Read {
+                            file: document.file.clone(),
+                            place: format!("{place} ({})", path.display()),
+                            cause,
+                            remedy: "put the image beside the scene or export a single .glb",
+                        })?;
+                        self.files.insert(index.value(), bytes);
+                    }
+                    &self.files[&index.value()]
+                }
+                Err(what) => return Err(document.invalid(place, what, REMEDY)),
+            },
+        };
+        let file = document.file.clone();
+        self.budget.decode(bytes, srgb).map_err(|failure| match failure {
+            Failure::Extension(extension) => self.unsupported(&place, extension),
+            Failure::Broken(what) => SceneError::Image { file, place, what, remedy: REMEDY },
+            Failure::TooLarge(what) => SceneError::TooLarge { file, place, what, remedy: "give smaller images" },
+        })
+    }
+}
+
+fn is_constant(texels: &Texels) -> bool {
+    match texels {
+        Texels::Rgba8 { data, .. } => data.iter().all(|t| *t == data[0]),
+        Texels::Rgba32F(data) => data.iter().all(|t| *t == data[0]),
+    }
+}
+
+fn least_alpha(texels: &Texels) -> f32 {
+    match texels {
+        Texels::Rgba8 { data, .. } => data.iter().map(|t| t[3]).min().map_or(1.0, |a| f32::from(a) / 255.0),
+        Texels::Rgba32F(data) => data.iter().map(|t| t.w).fold(1.0, f32::min),
+    }
+}

@@ -1,0 +1,171 @@
+//! Node transforms: the linear part in f64, the translation as an unevaluated sum of two f64 (106 bits).
+//!
+//! A root node that moves the scene 10⁶ times its size then changes no bit of what is computed relative to the scene:
+//! `t_world = t_parent ⊕ A_parent·t_local`, where only the sum feels the distance, and the sum keeps every bit.
+
+use glam::{DMat3, DQuat, DVec3};
+use gltf::json::Node;
+use twofloat::TwoFloat;
+
+/// A local transform: `x ↦ linear·x + translation`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Local {
+    pub linear: DMat3,
+    pub translation: DVec3,
+}
+
+/// A point of the world, too far away for one f64.
+pub(super) type WorldPoint = [TwoFloat; 3];
+
+/// World transform of a node or instance: `world_from_local`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Placement {
+    pub linear: DMat3,
+    pub translation: WorldPoint,
+}
+
+/// A placement seen from a nearby point: all in f64.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pose {
+    pub linear: DMat3,
+    pub offset: DVec3,
+}
+
+impl Local {
+    /// Translation, rotation (x, y, z, w; normalised here) and scale. A zero rotation counts as none.
+    pub fn from_trs(translation: [f32; 3], rotation: [f32; 4], scale: [f32; 3]) -> Local {
+        let [x, y, z, w] = rotation.map(f64::from);
+        let length = (x * x + y * y + z * z + w * w).sqrt();
+        let rotation = match length > 0.0 {
+            true => DMat3::from_quat(DQuat::from_xyzw(x / length, y / length, z / length, w / length)),
+            false => DMat3::IDENTITY,
+        };
+        let scale = DVec3::from_array(scale.map(f64::from));
+        Local {
+            linear: rotation * DMat3::from_diagonal(scale),
+            translation: DVec3::from_array(translation.map(f64::from)),
+        }
+    }
+
+    /// A column-major 4×4 matrix; its last row is taken as 0 0 0 1, as glTF demands.
+    pub fn from_matrix(matrix: &[f32; 16]) -> Local {
+        let column = |i: usize| DVec3::new(f64::from(matrix[i]), f64::from(matrix[i + 1]), f64::from(matrix[i + 2]));
+        Local { linear: DMat3::from_cols(column(0), column(4), column(8)), translation: column(12) }
+    }
+
+    /// The transform of a node, from its matrix or its translation, rotation and scale.
+    pub fn of_node(node: &Node) -> Local {
+        match &node.matrix {
+            Some(matrix) => Local::from_matrix(matrix),
+            None => Local::from_trs(
+                node.translation.unwrap_or([0.0; 3]),
+                node.rotation.unwrap_or_default().0,
+                node.scale.unwrap_or([1.0; 3]),
+            ),
+        }
+    }
+}
+
+impl Placement {
+    pub const IDENTITY: Placement = Placement { linear: DMat3::IDENTITY, translation: [TwoFloat::from_f64(0.0); 3] };
+
+    /// `world_from_child` of a child with this local transform.
+    pub fn child(&self, local: &Local) -> Placement {
+        let step = self.linear * local.translation;
+        let mut translation = self.translation;
+        for (sum, step) in translation.iter_mut().zip(step.to_array()) {
+            *sum += step;
+        }
+        Placement { linear: self.linear * local.linear, translation }
+    }
+
+    /// Whether every number is finite.
+    pub fn is_finite(&self) -> bool {
+        self.linear.is_finite() && self.translation.iter().all(|t| t.hi().is_finite() && t.lo().is_finite())
+    }
+
+    /// This placement relative to `origin`.
+    pub fn relative_to(&self, origin: &WorldPoint) -> Pose {
+        let axis = |i: usize| {
+            let difference = self.translation[i] - origin[i];
+            // + 0.0 turns −0 into +0: the sign of a vanished difference depends on where the scene stands.
+            difference.hi() + difference.lo() + 0.0
+        };
+        Pose { linear: self.linear, offset: DVec3::new(axis(0), axis(1), axis(2)) }
+    }
+}
+
+impl Pose {
+    pub fn apply(&self, point: DVec3) -> DVec3 {
+        self.linear * point + self.offset
+    }
+}
+
+/// `point + offset`, rounded to f64 per axis.
+pub(super) fn world_point(point: &WorldPoint, offset: DVec3) -> DVec3 {
+    let axis = |i: usize| {
+        let sum = point[i] + offset[i];
+        sum.hi() + sum.lo()
+    };
+    DVec3::new(axis(0), axis(1), axis(2))
+}
+
+/// What normals are multiplied with, up to a positive factor: the cofactor matrix times the determinant's sign, which
+/// is the inverse transpose without its division. Outward normals stay outward under mirroring; a flattening
+/// transform gives the normal of the plane that it flattens onto.
+pub(super) fn normal_matrix(linear: &DMat3) -> DMat3 {
+    let a = of_unit_size(linear);
+    let cofactor = DMat3::from_cols(a.y_axis.cross(a.z_axis), a.z_axis.cross(a.x_axis), a.x_axis.cross(a.y_axis));
+    if is_mirrored(linear) { cofactor * -1.0 } else { cofactor }
+}
+
+/// Whether the transform turns right hands into left hands.
+pub(super) fn is_mirrored(linear: &DMat3) -> bool {
+    of_unit_size(linear).determinant() < 0.0
+}
+
+/// Scaled so that the largest entry is ±1: products of three entries of 1e-200 would vanish.
+fn of_unit_size(linear: &DMat3) -> DMat3 {
+    let size = linear.to_cols_array().into_iter().fold(0.0f64, |size, x| size.max(x.abs()));
+    if size > 0.0 && size.is_finite() { *linear * size.recip() } else { DMat3::ZERO }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_distant_root_changes_no_bit() {
+        let steps = [DVec3::new(0.1, -0.7, 3.3), DVec3::new(1e-9, 0.3, -2.0), DVec3::new(0.0, 5.5, 0.123456789)];
+        let chain = |root: Placement| {
+            let linear = DMat3::from_quat(DQuat::from_rotation_y(0.7)) * 0.3;
+            let mut all = vec![root.child(&Local { linear, translation: steps[0] })];
+            for &translation in &steps[1..] {
+                let last = all[all.len() - 1];
+                all.push(last.child(&Local { linear, translation }));
+            }
+            let origin = all[0].translation;
+            all.iter().map(|p| p.relative_to(&origin).offset).collect::<Vec<_>>()
+        };
+        let here = chain(Placement::IDENTITY);
+        for distance in [1e5, 1e6, 3e7] {
+            let far = Local { linear: DMat3::IDENTITY, translation: DVec3::new(distance, -distance, 0.1 * distance) };
+            assert_eq!(chain(Placement::IDENTITY.child(&far)), here);
+        }
+    }
+
+    #[test]
+    fn normals_are_those_of_transformed_surfaces() {
+        let linear =
+            DMat3::from_cols(DVec3::new(2.0, 0.1, 0.0), DVec3::new(0.0, 1e-3, 0.4), DVec3::new(0.5, 0.0, -1.0));
+        let (u, v) = (DVec3::new(1.0, 2.0, 3.0), DVec3::new(-1.0, 0.5, 0.2));
+        for linear in [linear, linear * -1.0, linear * -1e-180] {
+            let n = (normal_matrix(&linear) * u.cross(v)).normalize();
+            assert!(n.dot((linear * u).normalize()).abs() < 1e-12);
+            assert!(n.dot((linear * v).normalize()).abs() < 1e-12);
+            // Outward stays outward: a point in front of the surface stays in front.
+            assert!(n.dot(linear * u.cross(v)) > 0.0);
+        }
+        assert_eq!(normal_matrix(&DMat3::ZERO), DMat3::ZERO);
+    }
+}

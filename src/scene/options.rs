@@ -1,0 +1,88 @@
+//! What the caller may choose about loading.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use glam::Vec3;
+use thiserror::Error;
+
+/// Choices of [`super::load`].
+#[derive(Debug, Clone)]
+pub struct LoadOptions {
+    /// The sky; glTF itself has none.
+    pub environment: Option<EnvironmentSource>,
+    /// Index of the glTF scene to load; the file's default scene where `None`.
+    pub scene: Option<usize>,
+    /// Store images whose texels are all equal as one texel. Never changes what a lookup returns.
+    pub collapse_constant_images: bool,
+}
+
+impl Default for LoadOptions {
+    fn default() -> Self {
+        LoadOptions { environment: None, scene: None, collapse_constant_images: true }
+    }
+}
+
+/// Where the sky comes from: `FILE.hdr`, `FILE.exr` or `R,G,B`, as the command line has it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum EnvironmentSource {
+    /// The same radiance from everywhere, W·m⁻²·sr⁻¹; finite and not negative.
+    Constant(Vec3),
+    /// An equirectangular map whose centre looks along −Z.
+    File(PathBuf),
+}
+
+/// Why a text is no [`EnvironmentSource`].
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum EnvironmentSourceError {
+    #[error("environment '{0}' is neither a .hdr or .exr file nor three numbers; write FILE.hdr, FILE.exr or R,G,B")]
+    Form(String),
+    #[error("environment '{text}': '{part}' is not a number; write R,G,B such as 1,1,1")]
+    Number { text: String, part: String },
+    #[error("environment '{text}': '{part}' is negative or not finite; radiance is a finite number from 0 up")]
+    Range { text: String, part: String },
+}
+
+impl FromStr for EnvironmentSource {
+    type Err = EnvironmentSourceError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let lower = text.to_ascii_lowercase();
+        if lower.ends_with(".hdr") || lower.ends_with(".exr") {
+            return Ok(EnvironmentSource::File(PathBuf::from(text)));
+        }
+        let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+        if parts.len() != 3 {
+            return Err(EnvironmentSourceError::Form(text.to_owned()));
+        }
+        let mut rgb = [0.0f32; 3];
+        for (value, part) in rgb.iter_mut().zip(parts) {
+            *value = part
+                .parse()
+                .map_err(|_| EnvironmentSourceError::Number { text: text.to_owned(), part: part.to_owned() })?;
+            if !value.is_finite() || *value < 0.0 {
+                return Err(EnvironmentSourceError::Range { text: text.to_owned(), part: part.to_owned() });
+            }
+        }
+        Ok(EnvironmentSource::Constant(Vec3::from_array(rgb)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reads_the_three_forms() {
+        assert_eq!("a b/SKY.HDR".parse(), Ok(EnvironmentSource::File("a b/SKY.HDR".into())));
+        assert_eq!("1,2,3.exr".parse(), Ok(EnvironmentSource::File("1,2,3.exr".into())));
+        assert_eq!("1, 0.5,2e-3".parse(), Ok(EnvironmentSource::Constant(Vec3::new(1.0, 0.5, 2e-3))));
+    }
+
+    #[test]
+    fn refuses_the_rest() {
+        for text in ["", "sky.png", "1,2", "1,2,3,4", "1,x,3", "1,-1,0", "nan,0,0", "inf,0,0"] {
+            assert!(text.parse::<EnvironmentSource>().is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! The report of a render, as JSON.
+
+use serde::Serialize;
+
+use super::leak::Leak;
+
+/// Version of the report's layout.
+pub const SCHEMA: &str = "lightprobe-render/1";
+
+#[derive(Debug, Clone, Serialize)]
+pub struct RenderReport {
+    pub schema: &'static str,
+    pub version: &'static str,
+    pub command: &'static str,
+    pub seed: u64,
+    pub threads: usize,
+    pub scene_blake3: String,
+    /// Configuration of the bake, RON.
+    pub config: String,
+    /// Whether the probes were baked from other bytes than the scene now has (`--allow-scene-change`).
+    pub scene_changed: bool,
+    pub camera: String,
+    pub width: u32,
+    pub height: u32,
+    /// Image points that show a surface.
+    pub points: usize,
+    /// Of all of the run's PNG pictures: they show radiance × 2^this.
+    pub exposure_ev: f32,
+    pub probes: usize,
+    pub probes_active: usize,
+    pub time_s: RenderTimes,
+    pub peak_memory_bytes: u64,
+    pub methods: Vec<MethodReport>,
+}
+
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct RenderTimes {
+    pub load: f64,
+    pub accel_build: f64,
+    /// Primary rays and shadow rays of punctual lights.
+    pub primary: f64,
+    pub total: f64,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct MethodReport {
+    pub name: &'static str,
+    /// Queries and shading of the whole picture, all threads, without rays.
+    pub shade_ms: Spread,
+    /// Rays that this method needs besides the queries: primary and shadow rays, with `visibility_ray` also those to
+    /// the probes.
+    pub ray_ms: f64,
+    /// One query on one thread.
+    pub lookup_ns: Option<f64>,
+    /// At run time, after the plan.
+    pub bytes_per_probe: f64,
+    /// Mean over image points, luminance, W·m⁻².
+    pub irradiance_indirect_mean: Option<f64>,
+    pub leak: Leak,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Spread {
+    pub min: f64,
+    pub median: f64,
+    pub max: f64,
+    pub runs: usize,
+}
+
+impl Spread {
+    /// Of at least one value.
+    pub fn of(mut values: Vec<f64>) -> Spread {
+        values.sort_by(f64::total_cmp);
+        let at = |i: usize| values.get(i).copied().unwrap_or(f64::NAN);
+        Spread { min: at(0), median: at(values.len() / 2), max: at(values.len().saturating_sub(1)), runs: values.len() }
+    }
+}

@@ -1,0 +1,42 @@
+//! Layers of a picture from its points.
+
+use glam::Vec3;
+
+use super::points::{ImagePoint, View};
+use crate::image::LayeredImage;
+use crate::light::lambert::reflected_radiance;
+
+/// Radiance towards the viewer, W·m⁻²·sr⁻¹: emitted, and reflected from direct and indirect light.
+pub fn beauty(point: &ImagePoint, irradiance_indirect: Vec3) -> Vec3 {
+    let surface = &point.surface;
+    surface.emission + reflected_radiance(surface.albedo, point.irradiance_direct + irradiance_indirect)
+}
+
+/// Sums a value of every point into pixels.
+pub fn to_pixels(view: &View, value: impl Fn(usize, &ImagePoint) -> Vec3) -> Vec<Vec3> {
+    let mut pixels = vec![Vec3::ZERO; view.width as usize * view.height as usize];
+    for (i, point) in view.points.iter().enumerate() {
+        pixels[point.pixel as usize] += value(i, point) * point.weight;
+    }
+    pixels
+}
+
+/// All layers of one method's picture; `indirect` is the irradiance from probes at every point.
+pub fn compose(view: &View, indirect: &[Vec3]) -> LayeredImage {
+    let mut image = LayeredImage::new(view.width, view.height);
+    let with_sky = |mut pixels: Vec<Vec3>| {
+        pixels.iter_mut().zip(&view.sky).for_each(|(p, sky)| *p += *sky);
+        pixels
+    };
+    image.push("beauty", with_sky(to_pixels(view, |i, p| beauty(p, indirect[i]))));
+    image.push("emission", with_sky(to_pixels(view, |_, p| p.surface.emission)));
+    let reflected = |p: &ImagePoint, irradiance| reflected_radiance(p.surface.albedo, irradiance);
+    image.push("direct", to_pixels(view, |_, p| reflected(p, p.irradiance_direct)));
+    image.push("indirect", to_pixels(view, |i, p| reflected(p, indirect[i])));
+    image.push("irradiance_direct", to_pixels(view, |_, p| p.irradiance_direct));
+    image.push("irradiance_indirect", to_pixels(view, |i, _| indirect[i]));
+    image.push("albedo", to_pixels(view, |_, p| p.surface.albedo));
+    image.push("normal", to_pixels(view, |_, p| p.normal));
+    image.push("depth", to_pixels(view, |_, p| Vec3::splat(p.depth)));
+    image
+}

@@ -1,0 +1,106 @@
+//! The probes' light at a picture's points: without visibility, with the method's own, and with exact rays.
+
+use std::time::Instant;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::points::ImagePoint;
+use crate::light::World;
+use crate::probe::query::{Query, Visibility};
+use crate::trace::Ray;
+
+/// How often the shading is repeated for its time.
+pub const RUNS: usize = 5;
+
+/// Points over which the time of a single look-up is averaged.
+const LOOKUP_POINTS: usize = 20_000;
+
+/// The three ways of treating visibility, in the order of the report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    Off,
+    On,
+    Ray,
+}
+
+impl Method {
+    pub const ALL: [Method; 3] = [Method::Off, Method::On, Method::Ray];
+
+    /// Name in the report and of the pictures.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Off => "visibility_off",
+            Method::On => "visibility_on",
+            Method::Ray => "visibility_ray",
+        }
+    }
+
+    /// Where a point's visibility factor comes from; `mask` is the exact one.
+    pub fn visibility(self, mask: u8) -> Visibility {
+        match self {
+            Method::Off => Visibility::Off,
+            Method::On => Visibility::Stored,
+            Method::Ray => Visibility::Exact(mask),
+        }
+    }
+}
+
+/// Which of its eight probes a point sees, exactly: bit i for corner i, inactive probes never.
+///
+/// Visible = the segment from the probe to P + ε·n_g is unblocked, n_g the geometric normal on the viewer's side.
+pub fn exact_masks(world: &World, query: &Query, points: &[ImagePoint]) -> Vec<u8> {
+    let volume = query.volume;
+    points
+        .par_iter()
+        .map(|point| {
+            let target = point.surface.ray_origin();
+            let cell = volume.grid.cell(point.surface.position);
+            (0..8).fold(0, |mask, i| {
+                let probe = volume.grid.corner(cell.base, i);
+                let position = volume.position(probe);
+                // A probe behind the surface is hidden by the surface itself.
+                let visible = volume.is_active(probe)
+                    && (position - target).dot(point.surface.geometric_normal) > 0.0
+                    && !world.tracer.occluded(Ray::segment(position, target, point.pixel));
+                mask | u8::from(visible) << i
+            })
+        })
+        .collect()
+}
+
+/// Irradiance at every point, W·m⁻².
+pub fn irradiance(query: &Query, points: &[ImagePoint], masks: &[u8], method: Method) -> Vec<Vec3> {
+    points
+        .par_iter()
+        .zip(masks)
+        .map(|(point, &mask)| query.irradiance(&point.query(), method.visibility(mask)))
+        .collect()
+}
+
+/// Milliseconds that querying and shading all points took, one entry a run.
+pub fn time_shading(query: &Query, points: &[ImagePoint], masks: &[u8], method: Method) -> Vec<f64> {
+    let mut radiance = vec![Vec3::ZERO; points.len()];
+    (0..RUNS)
+        .map(|_| {
+            let started = Instant::now();
+            radiance.par_iter_mut().zip(points.par_iter().zip(masks)).for_each(|(out, (point, &mask))| {
+                let indirect = query.irradiance(&point.query(), method.visibility(mask));
+                *out = super::layers::beauty(point, indirect);
+            });
+            std::hint::black_box(&radiance);
+            started.elapsed().as_secs_f64() * 1e3
+        })
+        .collect()
+}
+
+/// Nanoseconds of one look-up on one thread; `None` without points.
+pub fn time_lookup(query: &Query, points: &[ImagePoint], masks: &[u8], method: Method) -> Option<f64> {
+    let step = points.len().div_ceil(LOOKUP_POINTS).max(1);
+    let chosen: Vec<_> = points.iter().zip(masks).step_by(step).map(|(p, &mask)| (p.query(), mask)).collect();
+    let started = Instant::now();
+    for (point, mask) in &chosen {
+        std::hint::black_box(query.irradiance(point, method.visibility(*mask)));
+    }
+    (!chosen.is_empty()).then(|| started.elapsed().as_secs_f64() * 1e9 / chosen.len() as f64)
+}

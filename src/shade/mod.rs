@@ -1,0 +1,7 @@
+//! Cameras to pictures: what is seen, how probes light it, and the layers that come of it.
+
+pub mod framing;
+pub mod layers;
+pub mod methods;
+pub mod points;
+pub mod spheres;

@@ -1,0 +1,96 @@
+//! Primary visibility: the surface points that a picture's pixels show.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use crate::light::World;
+use crate::light::surface::SurfacePoint;
+use crate::math::random::{Purpose, Random};
+use crate::probe::query::QueryPoint;
+use crate::scene::{AlphaMode, Camera};
+use crate::trace::Ray;
+
+/// Rays per pixel where the scene has BLEND surfaces, which stop rays by chance.
+const BLEND_SAMPLES: u32 = 16;
+
+/// A surface point in a picture. A pixel has one, or several where translucent surfaces overlap.
+#[derive(Debug, Clone, Copy)]
+pub struct ImagePoint {
+    pub pixel: u32,
+    /// Share of the pixel.
+    pub weight: f32,
+    pub surface: SurfacePoint,
+    /// The surface's shading normal bent by its normal map, unit, on the viewer's side.
+    pub normal: Vec3,
+    /// Unit, towards the viewer.
+    pub view: Vec3,
+    /// From the camera, metres.
+    pub depth: f32,
+    /// Irradiance from punctual lights, W·m⁻².
+    pub irradiance_direct: Vec3,
+}
+
+impl ImagePoint {
+    pub fn query(&self) -> QueryPoint {
+        QueryPoint {
+            position: self.surface.position,
+            normal: self.normal,
+            geometric_normal: self.surface.geometric_normal,
+            view: self.view,
+        }
+    }
+}
+
+/// Everything a camera sees.
+#[derive(Debug, Clone)]
+pub struct View {
+    pub width: u32,
+    pub height: u32,
+    pub points: Vec<ImagePoint>,
+    /// Per pixel: radiance of the sky where rays leave the scene, W·m⁻²·sr⁻¹.
+    pub sky: Vec<Vec3>,
+}
+
+/// Shoots the picture's primary rays, through pixel centres, and the shadow rays of punctual lights.
+pub fn see(world: &World, camera: &Camera, width: u32, height: u32, seed: u64) -> View {
+    let blended = world.scene.materials.iter().any(|m| m.alpha_mode == AlphaMode::Blend);
+    let samples = if blended { BLEND_SAMPLES } else { 1 };
+    let pixel = |index: u32| {
+        let (origin, direction) = camera.pixel_ray(index % width, index / width, width, height);
+        let mut random = Random::new(seed, Purpose::Pixel, u64::from(index), 0);
+        let mut points: Vec<ImagePoint> = Vec::with_capacity(1);
+        let mut sky = Vec3::ZERO;
+        let weight = 1.0 / samples as f32;
+        for _ in 0..samples {
+            let ray = Ray::new(origin, direction, random.bits());
+            let Some(hit) = world.tracer.closest(ray) else {
+                sky += world.scene.environment.radiance(direction) * weight;
+                continue;
+            };
+            if let Some(known) = points.iter_mut().find(|p| p.surface.hit == hit) {
+                known.weight += weight;
+                continue;
+            }
+            let surface = world.surface_at(hit, direction);
+            let normal = world.bent_normal(&surface);
+            let (irradiance_direct, _) = world.punctual_irradiance(&surface, normal, random.bits());
+            let depth = hit.t;
+            points.push(ImagePoint { pixel: index, weight, surface, normal, view: -direction, depth, irradiance_direct });
+        }
+        (points, sky)
+    };
+    let found: Vec<(Vec<ImagePoint>, Vec3)> = (0..width * height).into_par_iter().map(pixel).collect();
+    let sky = found.iter().map(|f| f.1).collect();
+    View { width, height, points: found.into_iter().flat_map(|f| f.0).collect(), sky }
+}
+
+impl World<'_> {
+    /// The shading normal after the normal map, on the viewer's side; unbent where the map turns it away from there.
+    fn bent_normal(&self, surface: &SurfacePoint) -> Vec3 {
+        let side = if surface.front { 1.0 } else { -1.0 };
+        let front_normal = surface.shading_normal * side;
+        let hit = &surface.hit;
+        let bent = self.scene.normal_mapped(hit.triangle, hit.barycentric, front_normal) * side;
+        if bent.dot(surface.geometric_normal) > 0.0 { bent } else { surface.shading_normal }
+    }
+}

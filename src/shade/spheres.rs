@@ -1,0 +1,111 @@
+//! The probes as small spheres in the picture: shaded by their own irradiance, or coloured by why they are not baked.
+
+use glam::{Vec2, Vec3};
+
+use super::points::View;
+use crate::image::{Picture, Picture8};
+use crate::probe::placement::ProbeState;
+use crate::probe::{ProbeIndex, Volume};
+use crate::scene::Camera;
+use crate::scene::camera::Projection;
+
+/// Radius of the spheres, in spacings.
+const RADIUS: f32 = 0.08;
+
+/// sRGB colours of probes inside geometry and of those that no surface samples.
+const INSIDE_COLOR: [u8; 3] = [214, 48, 49];
+const UNSAMPLED_COLOR: [u8; 3] = [9, 132, 227];
+
+/// Draws the probes over a picture of the scene. Probes hidden behind surfaces stay hidden.
+pub fn draw(
+    scene_picture: &Picture8,
+    view: &View,
+    camera: &Camera,
+    volume: &Volume,
+    exposure_ev: f32,
+) -> Picture8 {
+    let (width, height) = (view.width, view.height);
+    let mut picture = scene_picture.clone();
+    let mut depth = vec![f32::INFINITY; width as usize * height as usize];
+    for point in &view.points {
+        let d = &mut depth[point.pixel as usize];
+        *d = d.min(point.depth);
+    }
+    let radius = RADIUS * volume.grid.spacing.min_element();
+    for p in 0..volume.states.len() {
+        let centre = volume.positions[p];
+        let Some((low, high)) = screen_box(camera, centre, radius, width, height) else { continue };
+        for y in low.1..high.1 {
+            for x in low.0..high.0 {
+                let (origin, direction) = camera.pixel_ray(x, y, width, height);
+                let Some(t) = ray_sphere(origin, direction, centre, radius) else { continue };
+                let pixel = (y * width + x) as usize;
+                if t < depth[pixel] {
+                    depth[pixel] = t;
+                    let normal = (origin + direction * t - centre) / radius;
+                    picture.pixels[pixel] = color(volume, p, normal, -direction, exposure_ev);
+                }
+            }
+        }
+    }
+    picture
+}
+
+fn color(volume: &Volume, probe: usize, normal: Vec3, view: Vec3, exposure_ev: f32) -> [u8; 3] {
+    let flat = |c: [u8; 3]| {
+        let shade = 0.45 + 0.55 * normal.dot(view).clamp(0.0, 1.0);
+        c.map(|v| (f32::from(v) * shade) as u8)
+    };
+    match volume.states[probe] {
+        ProbeState::InsideGeometry => flat(INSIDE_COLOR),
+        ProbeState::NeverSampled => flat(UNSAMPLED_COLOR),
+        ProbeState::Active => {
+            // A white sphere in the probe's own light.
+            let radiance = crate::light::lambert::reflected_radiance(
+                Vec3::ONE,
+                volume.probe_irradiance(ProbeIndex(probe as u32), normal),
+            );
+            Picture::from_pixels(1, 1, vec![radiance]).tonemapped(exposure_ev).pixels[0]
+        }
+    }
+}
+
+/// Pixels that a sphere may cover; `None` behind the camera.
+fn screen_box(
+    camera: &Camera,
+    centre: Vec3,
+    radius: f32,
+    width: u32,
+    height: u32,
+) -> Option<((u32, u32), (u32, u32))> {
+    let in_camera = camera.world_from_camera.transpose() * (centre - camera.position);
+    let scale = match camera.projection {
+        Projection::Perspective { fov_y_rad } => {
+            // Nearer than this the sphere would enclose the camera or fill the picture.
+            let distance = -in_camera.z - radius;
+            if distance <= radius {
+                return None;
+            }
+            1.0 / (distance * (0.5 * fov_y_rad).tan())
+        }
+        Projection::Orthographic { half_height_m } if in_camera.z < 0.0 => 1.0 / half_height_m,
+        Projection::Orthographic { .. } => return None,
+    };
+    let size = Vec2::new(width as f32, height as f32);
+    let aspect = size.x / size.y;
+    let middle = in_camera.truncate() * scale / Vec2::new(aspect, 1.0);
+    let reach = Vec2::new(radius * scale / aspect, radius * scale) * 1.5;
+    let to_pixel = |ndc: Vec2| (Vec2::new(ndc.x, -ndc.y) * 0.5 + 0.5) * size;
+    let a = to_pixel(middle + Vec2::new(-reach.x, reach.y)).max(Vec2::ZERO).floor();
+    let b = to_pixel(middle + Vec2::new(reach.x, -reach.y)).min(size).ceil();
+    (a.x < b.x && a.y < b.y).then(|| ((a.x as u32, a.y as u32), (b.x as u32, b.y as u32)))
+}
+
+/// Distance along the unit direction to the front of a sphere.
+fn ray_sphere(origin: Vec3, direction: Vec3, centre: Vec3, radius: f32) -> Option<f32> {
+    let to_centre = centre - origin;
+    let along = to_centre.dot(direction);
+    let miss_squared = (to_centre - direction * along).length_squared();
+    let half_chord_squared = radius * radius - miss_squared;
+    (along > 0.0 && half_chord_squared >= 0.0).then(|| along - half_chord_squared.sqrt())
+}

@@ -1,0 +1,222 @@
+//! The command line: what was typed. `commands/` turns it into what it means.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::scene::EnvironmentSource;
+
+/// Bakes light-field probe volumes for global illumination and measures how much they leak, err and cost.
+#[derive(Debug, Parser)]
+#[command(name = "lightprobe", version, propagate_version = true, arg_required_else_help = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Command,
+    #[command(flatten)]
+    pub output: OutputFlags,
+}
+
+#[derive(Debug, Args)]
+pub struct OutputFlags {
+    /// Print errors only.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Print what the program decides and how long it takes.
+    #[arg(short, long, global = true)]
+    pub verbose: bool,
+    /// Never draw progress bars (they appear on terminals only).
+    #[arg(long, global = true)]
+    pub no_progress: bool,
+    /// Print the report as JSON on standard output instead of tables.
+    #[arg(long, global = true)]
+    pub json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Bake a glTF scene into a probe file.
+    Bake(BakeArgs),
+    /// Shade a picture of the scene with probes, without and with visibility, and report leaks, times and bytes.
+    Render(RenderArgs),
+    /// Print what a probe file holds, and check its hashes.
+    Inspect(InspectArgs),
+}
+
+/// Flags of every command that loads a scene and traces it.
+#[derive(Debug, Args)]
+pub struct TraceArgs {
+    /// Sky: an equirectangular map or a constant radiance, W·m⁻²·sr⁻¹.
+    #[arg(long, value_name = "FILE.hdr|FILE.exr|R,G,B", value_parser = EnvironmentSource::from_str, allow_hyphen_values = true)]
+    pub env: Option<EnvironmentSource>,
+    /// Seed of all random numbers.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Threads to use; 0 means one per core. The result does not depend on it.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub threads: usize,
+}
+
+#[derive(Debug, Args)]
+pub struct BakeArgs {
+    /// Scene: a .glb or .gltf file.
+    #[arg(value_name = "SCENE", required_unless_present_any = ["print_config", "preset"])]
+    pub scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub trace: TraceArgs,
+    /// Probe file to write.
+    #[arg(short, long, value_name = "OUT.probes", required_unless_present_any = ["dry_run", "print_config", "preset"])]
+    pub output: Option<PathBuf>,
+    /// Configuration file.
+    #[arg(long, value_name = "FILE.ron", conflicts_with = "preset")]
+    pub config: Option<PathBuf>,
+    /// Built-in configuration; `list` prints their names.
+    #[arg(long, value_name = "NAME|list")]
+    pub preset: Option<String>,
+    /// Override one key of the configuration, for example grid.spacing_m=0.5; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Also write the report to this file.
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Print the plan with predicted time and memory, and stop.
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Print the effective configuration, and stop.
+    #[arg(long)]
+    pub print_config: bool,
+    /// Also trace the capture's rays with bare Embree and report their rate.
+    #[arg(long)]
+    pub measure_raw: bool,
+    /// Most memory for captured surfaces; what does not fit is traced again at every bounce, with the same result.
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    pub memory_budget: Option<u64>,
+    /// Continue an interrupted bake of the same scene, configuration and seed from OUT.probes.resume.
+    #[arg(long)]
+    pub resume: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct RenderArgs {
+    /// Scene: a .glb or .gltf file.
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    #[command(flatten)]
+    pub trace: TraceArgs,
+    /// Probe file that `bake` wrote.
+    #[arg(value_name = "PROBES")]
+    pub probes: PathBuf,
+    /// Folder for pictures and report; created where missing.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Camera of the scene by name or number, or `all` (a subfolder each); the first where not given.
+    #[arg(long, value_name = "NAME|INDEX|all", conflicts_with = "look_at")]
+    pub camera: Option<String>,
+    /// Camera by origin and target, metres in world space, and vertical field of view in degrees (60 where not given).
+    #[arg(long, value_name = "ox,oy,oz,tx,ty,tz[,fov]", value_parser = LookAt::from_str, allow_hyphen_values = true)]
+    pub look_at: Option<LookAt>,
+    /// Size of the pictures in pixels.
+    #[arg(long, value_name = "WxH", default_value = "640x360", value_parser = Size::from_str)]
+    pub size: Size,
+    /// Exposure of the PNG pictures, in powers of two; from the picture where not given.
+    #[arg(long, value_name = "EV", allow_hyphen_values = true, value_parser = parse_exposure)]
+    pub exposure: Option<f32>,
+    /// Render although the scene has changed since the bake.
+    #[arg(long)]
+    pub allow_scene_change: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct InspectArgs {
+    /// Probe file that `bake` wrote.
+    #[arg(value_name = "PROBES")]
+    pub probes: PathBuf,
+    /// Also print one probe: position, state, irradiance along the six axes.
+    #[arg(long, value_name = "I")]
+    pub probe: Option<u32>,
+}
+
+/// Width and height, pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Size {
+    pub width: u32,
+    pub height: u32,
+}
+
+/// Largest side of a picture, pixels.
+const MAX_SIDE: u32 = 16_384;
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Size, String> {
+        let side = |s: &str| s.parse::<u32>().ok().filter(|n| (1..=MAX_SIDE).contains(n));
+        let parts = text.split_once(['x', 'X']).and_then(|(w, h)| Some((side(w)?, side(h)?)));
+        let (width, height) =
+            parts.ok_or_else(|| format!("write width and height as 640x360, each from 1 to {MAX_SIDE}"))?;
+        Ok(Size { width, height })
+    }
+}
+
+/// A camera position and target in world space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LookAt {
+    pub origin: [f64; 3],
+    pub target: [f64; 3],
+    pub fov_y_deg: f32,
+}
+
+impl FromStr for LookAt {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<LookAt, String> {
+        let form = "write six or seven numbers: ox,oy,oz,tx,ty,tz[,fov]";
+        let numbers: Option<Vec<f64>> =
+            text.split(',').map(|s| s.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
+        let numbers = numbers.ok_or(form)?;
+        let (origin, target, fov) = match numbers[..] {
+            [a, b, c, d, e, f] => ([a, b, c], [d, e, f], 60.0),
+            [a, b, c, d, e, f, fov] => ([a, b, c], [d, e, f], fov),
+            _ => return Err(form.into()),
+        };
+        if origin == target {
+            return Err("origin and target are the same point".into());
+        }
+        if !(fov > 0.0 && fov < 180.0) {
+            return Err("the field of view must lie between 0 and 180 degrees".into());
+        }
+        Ok(LookAt { origin, target, fov_y_deg: fov as f32 })
+    }
+}
+
+fn parse_exposure(text: &str) -> Result<f32, String> {
+    let ev: Option<f32> = text.parse().ok().filter(|ev: &f32| ev.abs() <= 100.0);
+    ev.ok_or_else(|| "write a number from -100 to 100".into())
+}
+
+fn parse_size(text: &str) -> Result<u64, String> {
+    text.parse::<bytesize::ByteSize>()
+        .map(|size| size.as_u64())
+        .map_err(|_| "write a size such as 512MiB or 2GB".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes_and_views_are_checked() {
+        assert_eq!("64x36".parse(), Ok(Size { width: 64, height: 36 }));
+        assert!("0x5".parse::<Size>().is_err() && "64".parse::<Size>().is_err() && "99999x5".parse::<Size>().is_err());
+        assert_eq!("0,1,2,3,4,5".parse::<LookAt>().unwrap().fov_y_deg, 60.0);
+        for bad in ["0,1,2", "0,0,0,0,0,0", "0,1,2,3,4,5,180", "0,1,nan,3,4,5"] {
+            assert!(bad.parse::<LookAt>().is_err(), "{bad}");
+        }
+    }
+}

@@ -24,3 +24,7 @@ pub mod bake;
 pub mod plan;
 pub mod progress;
 pub mod report;
+pub mod cli;
+pub mod commands;
+pub mod image;
+pub mod shade;

@@ -1,3 +1,14 @@
-//! Figures and pictures for people and machines.
+//! Figures and pictures for people and machines: reports, tables, false-colour pictures, text in pictures.
 
 pub mod bake;
+pub mod canvas;
+pub mod colormap;
+pub mod font;
+pub mod format;
+pub mod heatmap;
+pub mod leak;
+pub mod legend;
+pub mod render;
+pub mod table;
+pub mod text;
+pub mod ticks;

@@ -1,0 +1,244 @@
+//! `lightprobe bake`: scene → probe file and report.
+
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+
+use super::{Console, load_scene, peak_memory_bytes, set_threads, write_json};
+use crate::bake::{Baked, Circumstances, Prepared, prepare};
+use crate::cli::BakeArgs;
+use crate::config::{Config, presets};
+use crate::light::World;
+use crate::plan::Line;
+use crate::probe::file::SceneRecord;
+use crate::probe::layout;
+use crate::report::bake::{BakeReport, BytesPerProbe, SCHEMA};
+use crate::report::format;
+use crate::report::table::{Column, Table};
+use crate::scene::Scene;
+
+pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
+    if args.preset.as_deref() == Some("list") {
+        return list_presets(console);
+    }
+    let config = resolve_config(args)?;
+    if args.print_config {
+        return console.print(&config.to_ron());
+    }
+    let path = args.scene.as_deref().context("no scene: give a .glb or .gltf file")?;
+    if !args.dry_run {
+        args.output.as_ref().context("no output: give -o OUT.probes")?;
+    }
+    let threads = set_threads(args.trace.threads)?;
+
+    let started = Instant::now();
+    let scene = load_scene(path, &args.trace, &config, console)?;
+    let load_s = started.elapsed().as_secs_f64();
+    let accel_started = Instant::now();
+    let world = World::new(&scene, config.lights.punctual_scale, config.solver.albedo_max)?;
+    let accel_build_s = accel_started.elapsed().as_secs_f64();
+    warn_if_dark(&world, path, console);
+
+    let circumstances = Circumstances {
+        seed: args.trace.seed,
+        memory_budget_bytes: args.memory_budget,
+        progress: console.progress,
+    };
+    let prepared = prepare(&world, &config, &circumstances)?;
+    if args.dry_run {
+        return dry_run(&prepared, &circumstances, console);
+    }
+    let raw = args.measure_raw.then(|| prepared.raw_rays_per_s(&circumstances)).flatten();
+    let record = SceneRecord { name: scene.name.clone(), blake3: scene.blake3.clone() };
+    let mut baked = prepared.bake(&circumstances, &record);
+
+    let Some(output) = &args.output else { return Ok(()) };
+    let write_started = Instant::now();
+    let file_bytes = baked.container.write(output)?;
+    baked.times.write = write_started.elapsed().as_secs_f64();
+    baked.times.load = load_s;
+    baked.times.accel_build = accel_build_s;
+    baked.times.total = started.elapsed().as_secs_f64();
+
+    let report = report(&baked, &config, &scene, args.trace.seed, threads, file_bytes, raw);
+    warn_about(&report, console);
+    if let Some(path) = &args.report {
+        write_json(path, &report)?;
+    }
+    if console.json {
+        return console.print(&serde_json::to_string_pretty(&report)?);
+    }
+    console.print(&summary(&report, output))
+}
+
+fn list_presets(console: &Console) -> Result<()> {
+    let lines: Vec<String> = presets::PRESETS.iter().map(|p| format!("{:<20} {}", p.name, p.summary)).collect();
+    console.print(&lines.join("\n"))
+}
+
+/// Defaults, then preset or file, then `--set`.
+fn resolve_config(args: &BakeArgs) -> Result<Config> {
+    let config = match (&args.config, &args.preset) {
+        (Some(path), _) => Config::load(path)?,
+        (None, Some(name)) => presets::find(name)?,
+        (None, None) => Config::default(),
+    };
+    Ok(config.with_overrides(&args.set)?)
+}
+
+fn warn_if_dark(world: &World, path: &Path, console: &Console) {
+    if world.scene.lights.is_empty() && !world.has_emitters() {
+        console.warn(format!(
+            "{}: the scene holds no light and everything will be black; give it a sky with --env R,G,B or --env FILE.hdr",
+            path.display()
+        ));
+    }
+}
+
+fn dry_run(prepared: &Prepared, circumstances: &Circumstances, console: &Console) -> Result<()> {
+    let (seconds, bytes) = prepared.predict(circumstances);
+    let active = prepared.placement.states.iter().filter(|s| **s as u8 == 0).count();
+    if console.json {
+        let report = serde_json::json!({
+            "schema": "lightprobe-plan/1",
+            "probes": prepared.grid.probe_count(),
+            "probes_active": active,
+            "predicted_time_s": seconds,
+            "predicted_memory_bytes": bytes,
+            "plan": prepared.plan.lines,
+        });
+        return console.print(&serde_json::to_string_pretty(&report)?);
+    }
+    console.print(&plan_table(&prepared.plan.lines))?;
+    console.print(&format!(
+        "{} probes, {active} of them to bake; about {} before the bounces and {} of captures in memory",
+        prepared.grid.probe_count(),
+        format::seconds(seconds),
+        format::bytes(bytes),
+    ))
+}
+
+fn plan_table(lines: &[Line]) -> String {
+    let mut table = Table::new(&[
+        ("stage", Column::Text),
+        ("", Column::Text),
+        ("why", Column::Text),
+        ("saved", Column::Number),
+    ]);
+    for line in lines {
+        let saved = [line.saved_bytes.map(format::bytes), line.saved_s.map(format::seconds)];
+        let saved: Vec<String> = saved.into_iter().flatten().collect();
+        let kept = if line.kept { "kept" } else { "left out" };
+        table.push([line.stage.to_owned(), kept.to_owned(), line.reason.clone(), saved.join(", ")]);
+    }
+    table.to_string()
+}
+
+fn report(
+    baked: &Baked,
+    config: &Config,
+    scene: &Scene,
+    seed: u64,
+    threads: usize,
+    file_bytes: u64,
+    raw: Option<f64>,
+) -> BakeReport {
+    let probes = baked.volume.states.len();
+    let traced = (baked.rays.primary + baked.rays.shadow) as f64;
+    let irradiance = layout::irradiance_bytes(&config.filter, &config.encoding) as f64;
+    let visibility = layout::visibility_bytes(
+        config.query.visibility,
+        &config.filter,
+        &config.encoding,
+        baked.surface_bytes,
+        probes,
+    );
+    BakeReport {
+        schema: SCHEMA,
+        version: env!("CARGO_PKG_VERSION"),
+        command: "bake",
+        seed,
+        threads,
+        scene_blake3: scene.blake3.clone(),
+        config: config.to_ron(),
+        probes,
+        probes_active: baked.volume.active_count(),
+        rays: baked.rays,
+        time_s: baked.times,
+        rays_per_s: (baked.times.capture > 0.0).then(|| traced / baked.times.capture),
+        raw_embree_rays_per_s: raw,
+        peak_memory_bytes: peak_memory_bytes(),
+        bytes_per_probe: BytesPerProbe {
+            runtime: irradiance + visibility,
+            runtime_kept: irradiance + if baked.plan.visibility { visibility } else { 0.0 },
+            file: file_bytes as f64 / probes as f64,
+            tensors: baked.container.tensors.iter().map(|(n, t)| (n.clone(), t.bytes.len() as u64)).collect(),
+        },
+        bounces: baked.solution.bounces.clone(),
+        converged: baked.solution.converged,
+        spectral_radius_estimate: baked.solution.spectral_radius_estimate,
+        numerics: baked.numerics.clone(),
+        plan: baked.plan.lines.clone(),
+    }
+}
+
+fn warn_about(report: &BakeReport, console: &Console) {
+    let numerics = &report.numerics;
+    if report.probes_active == 0 {
+        console.warn("no probe is active: all lie inside geometry or where no surface can sample them; change the grid");
+    }
+    if numerics.hits_outside_volume > 0 {
+        console.warn(format!(
+            "{} captured hits lie outside the probes' hull and use the nearest cell; enlarge grid.bounds",
+            numerics.hits_outside_volume
+        ));
+    }
+    if numerics.non_finite > 0 {
+        console.warn(format!("{} values were not finite and count as zero", numerics.non_finite));
+    }
+    if numerics.albedo_clamped > 0 {
+        console.warn(format!(
+            "{} material(s) have an albedo above solver.albedo_max and are clamped to it",
+            numerics.albedo_clamped
+        ));
+    }
+    if !report.converged {
+        console.warn("the bounces did not converge; raise solver.max_bounces or solver.tolerance");
+    }
+    for (tensor, &count) in numerics.clamped.iter().filter(|c| *c.1 > 0) {
+        console.warn(format!("{count} value(s) of tensor '{tensor}' are beyond its format's range and clamped"));
+    }
+}
+
+fn summary(report: &BakeReport, output: &Path) -> String {
+    let t = &report.time_s;
+    let mut table = Table::new(&[("bake", Column::Text), ("", Column::Number)]);
+    let rate = |r: Option<f64>| r.map_or(format::UNDEFINED.to_owned(), |r| format!("{} M/s", format::significant(r / 1e6, 3)));
+    for (name, value) in [
+        ("probes (active)", format!("{} ({})", report.probes, report.probes_active)),
+        ("rays", format!("{} M", format::significant((report.rays.primary + report.rays.shadow) as f64 / 1e6, 3))),
+        ("ray rate", rate(report.rays_per_s)),
+        ("bounces", format!("{}", report.bounces.len().saturating_sub(1))),
+        ("load and build", format::seconds(t.load + t.accel_build)),
+        ("survey", format::seconds(t.survey)),
+        ("capture", format::seconds(t.capture)),
+        ("bounce time", format::seconds(t.bounces)),
+        ("total", format::seconds(t.total)),
+        ("memory per probe", format::bytes(report.bytes_per_probe.runtime_kept.round() as u64)),
+        ("peak memory", format::bytes(report.peak_memory_bytes)),
+    ] {
+        table.push([name.to_owned(), value]);
+    }
+    if let Some(raw) = report.raw_embree_rays_per_s {
+        let share = report.rays_per_s.map_or(0.0, |r| r / raw);
+        table.push(["bare Embree".to_owned(), format!("{} ({} of it reached)", rate(Some(raw)), format::percent(share))]);
+    }
+    format!("{}\n{}\nwrote {}", table, plan_summary(&report.plan), output.display())
+}
+
+fn plan_summary(lines: &[Line]) -> String {
+    let left_out: Vec<&str> = lines.iter().filter(|l| !l.kept).map(|l| l.stage).collect();
+    if left_out.is_empty() { "left out: nothing".to_owned() } else { format!("left out: {}", left_out.join(", ")) }
+}
+

@@ -1,0 +1,142 @@
+//! `lightprobe inspect`: what a probe file holds.
+
+use anyhow::{Result, ensure};
+use glam::Vec3;
+use serde_json::{Value, json};
+
+use super::Console;
+use crate::cli::InspectArgs;
+use crate::probe::file::{self, FORMAT, ProbeFile};
+use crate::probe::placement::ProbeState;
+use crate::probe::{ProbeIndex, Volume};
+use crate::report::format;
+use crate::report::table::{Column, Table};
+
+pub fn run(args: &InspectArgs, console: &Console) -> Result<()> {
+    let file = file::read(&args.probes)?;
+    let volume = file.volume_in_grid();
+    if let Some(probe) = args.probe {
+        let count = volume.states.len();
+        ensure!((probe as usize) < count, "--probe {probe}: {} holds probes 0 to {}", args.probes.display(), count - 1);
+    }
+    if console.json {
+        return console.print(&serde_json::to_string_pretty(&to_json(&file, args.probe))?);
+    }
+    console.print(&to_text(&file, args.probe))
+}
+
+fn states(volume: &Volume) -> [usize; 3] {
+    let count = |state| volume.states.iter().filter(|&&s| s == state).count();
+    [count(ProbeState::Active), count(ProbeState::InsideGeometry), count(ProbeState::NeverSampled)]
+}
+
+/// Irradiance of one probe along ±X, ±Y, ±Z.
+fn axes(volume: &Volume, probe: ProbeIndex) -> [(&'static str, Vec3); 6] {
+    [("+x", Vec3::X), ("-x", -Vec3::X), ("+y", Vec3::Y), ("-y", -Vec3::Y), ("+z", Vec3::Z), ("-z", -Vec3::Z)]
+        .map(|(name, axis)| (name, volume.probe_irradiance(probe, axis)))
+}
+
+fn position_world(volume: &Volume, probe: ProbeIndex) -> [f64; 3] {
+    (volume.grid.origin_world + volume.position(probe).as_dvec3()).to_array()
+}
+
+fn to_json(file: &ProbeFile, probe: Option<u32>) -> Value {
+    let volume = file.volume_in_grid();
+    let [active, inside, unsampled] = states(volume);
+    let tensors: Value = file
+        .tensor_shapes
+        .iter()
+        .map(|(name, (dtype, shape))| {
+            (name.clone(), json!({"dtype": dtype, "shape": shape, "bytes": file.tensor_bytes[name]}))
+        })
+        .collect();
+    let mut out = json!({
+        "schema": "lightprobe-inspect/1",
+        "format": FORMAT,
+        "hashes": "match",
+        "file_bytes": file.file_bytes,
+        "grid": {
+            "kind": "uniform",
+            "origin": volume.grid.origin_world.to_array(),
+            "spacing": volume.grid.spacing.to_array(),
+            "divisions": volume.grid.divisions.to_array(),
+            "border": file.border,
+        },
+        "probes": volume.states.len(),
+        "probes_active": active,
+        "probes_inside_geometry": inside,
+        "probes_never_sampled": unsampled,
+        "encoding": {"irradiance": volume.curve.name(), "scale_irradiance": file.irradiance_scale},
+        "tensors": tensors,
+        "scene": file.scene,
+        "plan": file.plan,
+        "config": file.config,
+    });
+    if let Some(p) = probe {
+        let index = ProbeIndex(p);
+        let irradiance: Value = axes(volume, index).into_iter().map(|(n, e)| (n.to_owned(), json!(e.to_array()))).collect();
+        out["probe"] = json!({
+            "index": p,
+            "position_m": position_world(volume, index),
+            "state": volume.states[p as usize],
+            "irradiance": irradiance,
+        });
+    }
+    out
+}
+
+fn to_text(file: &ProbeFile, probe: Option<u32>) -> String {
+    let volume = file.volume_in_grid();
+    let grid = &volume.grid;
+    let [active, inside, unsampled] = states(volume);
+    let mut out = format!(
+        "{FORMAT}, {}, all hashes match\n\
+         scene     {} (BLAKE3 {})\n\
+         grid      uniform, {} × {} × {} probes, spacing {} m, origin {} m, border {}\n\
+         probes    {} ({active} active, {inside} inside geometry, {unsampled} never sampled)\n\
+         encoding  irradiance {}, scale {}\n",
+        format::bytes(file.file_bytes),
+        file.scene.name,
+        file.scene.blake3,
+        grid.divisions.x,
+        grid.divisions.y,
+        grid.divisions.z,
+        grid.spacing,
+        grid.origin_world,
+        file.border,
+        volume.states.len(),
+        volume.curve.name(),
+        file.irradiance_scale,
+    );
+    let mut table = Table::new(&[
+        ("tensor", Column::Text),
+        ("type", Column::Text),
+        ("shape", Column::Text),
+        ("bytes", Column::Number),
+        ("per probe", Column::Number),
+    ]);
+    for (name, (dtype, shape)) in &file.tensor_shapes {
+        let bytes = file.tensor_bytes[name];
+        let per_probe = bytes as f64 / volume.states.len() as f64;
+        let per_probe = format!("{} B", format::significant(per_probe, 3));
+        table.push([name.clone(), dtype.clone(), format!("{shape:?}"), format::bytes(bytes), per_probe]);
+    }
+    out += &format!("{table}\n");
+    if let Some(p) = probe {
+        let index = ProbeIndex(p);
+        let state = serde_json::to_value(volume.states[p as usize]).unwrap_or_default();
+        out += &format!("probe {p} at {:?} m, {}\n", position_world(volume, index), state.as_str().unwrap_or_default());
+        for (name, e) in axes(volume, index) {
+            out += &format!("  irradiance {name}  {:.6} {:.6} {:.6}\n", e.x, e.y, e.z);
+        }
+    }
+    if let Some(lines) = file.plan["lines"].as_array() {
+        out += "plan\n";
+        for line in lines {
+            let kept = if line["kept"].as_bool().unwrap_or(true) { "kept" } else { "left out" };
+            let text = |key: &str| line[key].as_str().unwrap_or_default().to_owned();
+            out += &format!("  {:<22} {kept:<9} {}\n", text("stage"), text("reason"));
+        }
+    }
+    out + "configuration\n" + &file.config
+}

@@ -1,0 +1,107 @@
+//! One file a subcommand. Here errors become one line and an exit code.
+
+pub mod bake;
+pub mod inspect;
+pub mod render;
+
+use std::io::Write;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+
+use crate::cli::{Cli, Command, OutputFlags, TraceArgs};
+use crate::config::Config;
+use crate::output::write_atomically;
+use crate::progress::Progress;
+use crate::scene::{self, EnvironmentSource, LoadOptions, Scene};
+
+/// How a command speaks to its user: results on standard output, all else on standard error.
+#[derive(Debug, Clone, Copy)]
+pub struct Console {
+    quiet: bool,
+    verbose: bool,
+    pub json: bool,
+    pub progress: Progress,
+}
+
+impl Console {
+    fn new(flags: &OutputFlags) -> Console {
+        let progress = Progress::new(!flags.no_progress && !flags.quiet);
+        Console { quiet: flags.quiet, verbose: flags.verbose, json: flags.json, progress }
+    }
+
+    pub fn warn(&self, message: impl AsRef<str>) {
+        if !self.quiet {
+            eprintln!("warning: {}", message.as_ref());
+        }
+    }
+
+    pub fn say(&self, message: impl AsRef<str>) {
+        if self.verbose {
+            eprintln!("{}", message.as_ref());
+        }
+    }
+
+    /// Prints a result. A reader that has gone away (`| head`) is no error.
+    pub fn print(&self, text: &str) -> Result<()> {
+        match writeln!(std::io::stdout().lock(), "{}", text.trim_end()) {
+            Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => std::process::exit(0),
+            done => done.context("cannot write to standard output"),
+        }
+    }
+}
+
+/// Runs the command that was typed.
+pub fn run(cli: Cli) -> Result<()> {
+    let console = Console::new(&cli.output);
+    match cli.command {
+        Command::Bake(args) => bake::run(&args, &console),
+        Command::Render(args) => render::run(&args, &console),
+        Command::Inspect(args) => inspect::run(&args, &console),
+    }
+}
+
+/// Binds the work to so many threads; 0 means one per core.
+fn set_threads(threads: usize) -> Result<usize> {
+    /// More than any machine has; guards against typing errors that would exhaust memory.
+    const MOST: usize = 1024;
+    anyhow::ensure!(threads <= MOST, "--threads {threads}: at most {MOST} make sense; use 0 for one per core");
+    // Fails only when a pool stands already, as when commands run twice in one process.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    Ok(rayon::current_num_threads())
+}
+
+/// Loads a scene with the sky from the command line, else from the configuration, and passes its warnings on.
+fn load_scene(path: &Path, trace: &TraceArgs, config: &Config, console: &Console) -> Result<Scene> {
+    let from_config = config.lights.sky.map(|sky| EnvironmentSource::Constant(sky.into()));
+    let environment = trace.env.clone().or(from_config);
+    let collapse_constant_images = config.plan == crate::config::PlanMode::LeaveOut;
+    let scene = scene::load(path, &LoadOptions { environment, collapse_constant_images, ..Default::default() })?;
+    for warning in &scene.warnings {
+        console.warn(warning);
+    }
+    if scene.dropped.total() > 0 {
+        let d = scene.dropped;
+        console.warn(format!(
+            "{}: dropped {} triangle(s) without area and {} with coordinates that are not finite",
+            path.display(),
+            d.zero_area,
+            d.non_finite
+        ));
+    }
+    Ok(scene)
+}
+
+/// Largest resident memory of this process so far.
+fn peak_memory_bytes() -> u64 {
+    let usage = nix::sys::resource::getrusage(nix::sys::resource::UsageWho::RUSAGE_SELF);
+    // Linux counts in KiB.
+    usage.map_or(0, |u| u.max_rss() as u64 * 1024)
+}
+
+/// Writes a report as JSON.
+fn write_json(path: &Path, report: &impl serde::Serialize) -> Result<()> {
+    let text = serde_json::to_string_pretty(report).context("cannot write the report as JSON")?;
+    write_atomically(path, |file| writeln!(file, "{text}"))?;
+    Ok(())
+}

@@ -1,0 +1,352 @@
+//! `lightprobe render`: scene + probes → pictures and report.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+use glam::{DVec3, Vec3};
+
+use super::{Console, load_scene, peak_memory_bytes, set_threads, write_json};
+use crate::cli::{LookAt, RenderArgs};
+use crate::config::Config;
+use crate::image::{LayeredImage, Picture8};
+use crate::light::World;
+use crate::math::color::luminance;
+use crate::output::create_folder;
+use crate::probe::file::{self, ProbeFile};
+use crate::probe::query::{Query, VisibilitySettings};
+use crate::probe::{Volume, layout};
+use crate::report::colormap::Scale;
+use crate::report::format;
+use crate::report::heatmap::{Heatmap, range_of};
+use crate::report::leak;
+use crate::report::render::{MethodReport, RenderReport, RenderTimes, SCHEMA, Spread};
+use crate::report::table::{Column, Table};
+use crate::scene::{Camera, Scene};
+use crate::shade::framing::frame;
+use crate::shade::layers::{compose, to_pixels};
+use crate::shade::methods::{Method, exact_masks, irradiance, time_lookup, time_shading};
+use crate::shade::points::{View, see};
+use crate::shade::spheres;
+
+/// What all cameras of a run share.
+struct Run<'a> {
+    args: &'a RenderArgs,
+    console: &'a Console,
+    world: &'a World<'a>,
+    config: &'a Config,
+    volume: &'a Volume,
+    bytes_per_probe: f64,
+    scene_changed: bool,
+    threads: usize,
+    times: RenderTimes,
+    started: Instant,
+}
+
+/// One method's results.
+struct Shaded {
+    method: Method,
+    irradiance: Vec<Vec3>,
+    report: MethodReport,
+    image: LayeredImage,
+}
+
+pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
+    let started = Instant::now();
+    let threads = set_threads(args.trace.threads)?;
+    let probes = file::read(&args.probes)?;
+    let config = Config::parse(&probes.config, &format!("{}: its configuration", args.probes.display()))?;
+    let scene = load_scene(&args.scene, &args.trace, &config, console)?;
+    let scene_changed = check_scene(args, &probes, &scene, console)?;
+    let mut times = RenderTimes { load: started.elapsed().as_secs_f64(), ..Default::default() };
+
+    let accel_started = Instant::now();
+    let world = World::new(&scene, config.lights.punctual_scale, config.solver.albedo_max)?;
+    times.accel_build = accel_started.elapsed().as_secs_f64();
+
+    let volume = volume_as_planned(&probes, &scene);
+    let bytes_per_probe = runtime_bytes(&probes, &config);
+    let cameras = cameras(args, &world, console)?;
+    let run = Run {
+        args,
+        console,
+        world: &world,
+        config: &config,
+        volume: &volume,
+        bytes_per_probe,
+        scene_changed,
+        threads,
+        times,
+        started,
+    };
+    let mut reports = Vec::new();
+    for camera in &cameras {
+        let folder = if args.camera.as_deref() == Some("all") {
+            args.output.join(folder_name(&camera.name))
+        } else {
+            args.output.clone()
+        };
+        reports.push(render_camera(&run, camera, &folder)?);
+    }
+    if console.json {
+        let json = if let [report] = &reports[..] {
+            serde_json::to_string_pretty(report)?
+        } else {
+            serde_json::to_string_pretty(&reports)?
+        };
+        return console.print(&json);
+    }
+    for report in &reports {
+        console.print(&table(report))?;
+    }
+    console.print(&format!("wrote {}", args.output.display()))
+}
+
+/// Whether the scene is another than the probes were baked from; an error unless allowed.
+fn check_scene(args: &RenderArgs, probes: &ProbeFile, scene: &Scene, console: &Console) -> Result<bool> {
+    if probes.scene.blake3 == scene.blake3 {
+        return Ok(false);
+    }
+    let what = format!(
+        "{} was baked from another scene than {} now is (its files or its sky have changed)",
+        args.probes.display(),
+        args.scene.display()
+    );
+    if !args.allow_scene_change {
+        bail!("{what}; bake it again, give the --env of the bake, or pass --allow-scene-change");
+    }
+    console.warn(what);
+    Ok(true)
+}
+
+/// The volume without what the plan found unnecessary, should the file hold it all the same.
+fn volume_as_planned(probes: &ProbeFile, scene: &Scene) -> Volume {
+    let mut volume = probes.volume(scene.origin_world);
+    if probes.plan["visibility"] == serde_json::Value::Bool(false) {
+        volume.distance = None;
+        volume.surface_visibility = None;
+    }
+    volume
+}
+
+/// Bytes per probe of what the file holds, in the layout that shading uses.
+fn runtime_bytes(probes: &ProbeFile, config: &Config) -> f64 {
+    let count = probes.volume_in_grid().states.len();
+    let surface = probes.volume_in_grid().surface_visibility.as_ref().map_or(0, |s| s.bytes());
+    let visibility = match config.query.visibility {
+        _ if probes.plan["visibility"] == serde_json::Value::Bool(false) => VisibilitySettings::None,
+        visibility => visibility,
+    };
+    layout::irradiance_bytes(&config.filter, &config.encoding) as f64
+        + layout::visibility_bytes(visibility, &config.filter, &config.encoding, surface, count)
+}
+
+/// The cameras that the arguments ask for.
+fn cameras(args: &RenderArgs, world: &World, console: &Console) -> Result<Vec<Camera>> {
+    let scene = world.scene;
+    if let Some(LookAt { origin, target, fov_y_deg }) = args.look_at {
+        let local = |p: [f64; 3]| (DVec3::from(p) - scene.origin_world).as_vec3();
+        return Ok(vec![Camera::look_at("look-at", local(origin), local(target), fov_y_deg.to_radians())]);
+    }
+    let known = || scene.cameras.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ");
+    match args.camera.as_deref() {
+        Some(name) if !scene.cameras.is_empty() || (name != "all" && name != "0") => {
+            if name == "all" {
+                return Ok(scene.cameras.clone());
+            }
+            let by_index = || name.parse::<usize>().ok().and_then(|i| scene.cameras.get(i));
+            let camera = scene.cameras.iter().find(|c| c.name == name).or_else(by_index);
+            let camera = camera.with_context(|| match scene.cameras.len() {
+                0 => format!("--camera {name}: the scene has no cameras; leave it out or use --look-at"),
+                n => format!("--camera {name}: the scene has the cameras {} (numbers 0 to {})", known(), n - 1),
+            })?;
+            Ok(vec![camera.clone()])
+        }
+        _ => Ok(vec![match scene.cameras.first() {
+            Some(camera) => camera.clone(),
+            None => {
+                let bounds = scene.mesh.bounds().unwrap_or((Vec3::NEG_ONE, Vec3::ONE));
+                let (camera, inside) = frame(&world.tracer, bounds);
+                let from = if inside { "from inside" } else { "from outside" };
+                console.warn(format!("the scene has no camera: framed it {from}; use --look-at for another view"));
+                camera
+            }
+        }]),
+    }
+}
+
+/// A camera's name as the name of a folder.
+fn folder_name(camera: &str) -> String {
+    let safe = |c: char| if c.is_alphanumeric() || matches!(c, '-' | '_' | '#' | ' ') { c } else { '_' };
+    camera.chars().map(safe).collect()
+}
+
+fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderReport> {
+    let (args, volume) = (run.args, run.volume);
+    let query = Query { volume, settings: &run.config.query };
+    let bar = run.console.progress.stage("rendering", 2 + Method::ALL.len());
+    let primary_started = Instant::now();
+    let view = see(run.world, camera, args.size.width, args.size.height, args.trace.seed);
+    let primary_s = primary_started.elapsed().as_secs_f64();
+    bar.inc(1);
+    let masks_started = Instant::now();
+    let masks = exact_masks(run.world, &query, &view.points);
+    let masks_s = masks_started.elapsed().as_secs_f64();
+    bar.inc(1);
+
+    let exact = irradiance(&query, &view.points, &masks, Method::Ray);
+    let shade = |method: Method| {
+        let irradiance = irradiance(&query, &view.points, &masks, method);
+        let ray_s = if method == Method::Ray { primary_s + masks_s } else { primary_s };
+        let report = MethodReport {
+            name: method.name(),
+            shade_ms: Spread::of(time_shading(&query, &view.points, &masks, method)),
+            ray_ms: ray_s * 1e3,
+            lookup_ns: time_lookup(&query, &view.points, &masks, method),
+            bytes_per_probe: run.bytes_per_probe,
+            irradiance_indirect_mean: mean_luminance(&view, &irradiance),
+            leak: leak::measure(&query, &view.points, &masks, method, &irradiance, &exact),
+        };
+        bar.inc(1);
+        Shaded { method, image: compose(&view, &irradiance), irradiance, report }
+    };
+    let shaded = Method::ALL.map(shade);
+    bar.finish_and_clear();
+
+    let exposure_ev = args.exposure.unwrap_or_else(|| exposure(&shaded[2]));
+    create_folder(folder)?;
+    write_pictures(run, camera, &view, &shaded, exposure_ev, folder)?;
+    let report = RenderReport {
+        schema: SCHEMA,
+        version: env!("CARGO_PKG_VERSION"),
+        command: "render",
+        seed: args.trace.seed,
+        threads: run.threads,
+        scene_blake3: run.world.scene.blake3.clone(),
+        config: run.config.to_ron(),
+        scene_changed: run.scene_changed,
+        camera: camera.name.clone(),
+        width: view.width,
+        height: view.height,
+        points: view.points.len(),
+        exposure_ev,
+        probes: volume.states.len(),
+        probes_active: volume.active_count(),
+        time_s: RenderTimes { primary: primary_s, total: run.started.elapsed().as_secs_f64(), ..run.times },
+        peak_memory_bytes: peak_memory_bytes(),
+        methods: shaded.into_iter().map(|s| s.report).collect(),
+    };
+    write_json(&folder.join("report.json"), &report)?;
+    Ok(report)
+}
+
+/// Mean over image points by their share of a pixel.
+fn mean_luminance(view: &View, irradiance: &[Vec3]) -> Option<f64> {
+    let weight: f64 = view.points.iter().map(|p| f64::from(p.weight)).sum();
+    let sum: f64 = view.points.iter().zip(irradiance).map(|(p, e)| f64::from(p.weight * luminance(*e))).sum();
+    (weight > 0.0).then(|| sum / weight)
+}
+
+/// Exposure of the whole run: that of the picture with exact visibility.
+fn exposure(shaded: &Shaded) -> f32 {
+    shaded.image.picture("beauty").map_or(0.0, |p| p.auto_exposure_ev())
+}
+
+fn write_pictures(
+    run: &Run,
+    camera: &Camera,
+    view: &View,
+    shaded: &[Shaded; 3],
+    exposure_ev: f32,
+    folder: &Path,
+) -> Result<()> {
+    let file = |name: &str, extension: &str| -> PathBuf { folder.join(format!("{name}.{extension}")) };
+    let tonemapped = |image: &LayeredImage| match image.picture("beauty") {
+        Some(picture) => picture.tonemapped(exposure_ev),
+        None => Picture8::filled(view.width, view.height, [0; 3]),
+    };
+    for s in shaded {
+        s.image.write_exr(&file(s.method.name(), "exr"))?;
+        tonemapped(&s.image).write_png(&file(s.method.name(), "png"))?;
+    }
+    let [off, on, exact] = shaded;
+    let difference = |s: &Shaded| {
+        let signed = |i: usize| Vec3::splat(luminance(s.irradiance[i]) - luminance(exact.irradiance[i]));
+        to_pixels(view, |i, _| signed(i))
+    };
+    let (off_leak, on_leak) = (difference(off), difference(on));
+    let mut image = LayeredImage::new(view.width, view.height);
+    image.push("leak_on", on_leak.clone());
+    image.push("leak_off", off_leak.clone());
+    image.write_exr(&file("leak", "exr"))?;
+    leak_map(view, &off_leak, &on_leak).write_png(&file("leak", "png"))?;
+    let probes = spheres::draw(&tonemapped(&exact.image), view, camera, run.volume, exposure_ev);
+    probes.write_png(&file("probes", "png"))?;
+    Ok(())
+}
+
+/// Both signed differences side by side under one scale: without visibility on the left, with it on the right.
+fn leak_map(view: &View, off: &[Vec3], on: &[Vec3]) -> Picture8 {
+    let mut has_surface = vec![false; off.len()];
+    view.points.iter().for_each(|p| has_surface[p.pixel as usize] = true);
+    let width = view.width as usize;
+    let mut values = Vec::with_capacity(2 * off.len());
+    for row in 0..view.height as usize {
+        for half in [off, on] {
+            let pixels = row * width..(row + 1) * width;
+            values.extend(pixels.map(|i| if has_surface[i] { half[i].x } else { f32::NAN }));
+        }
+    }
+    Heatmap {
+        values: &values,
+        width: 2 * view.width,
+        height: view.height,
+        range: range_of(&values, Scale::Diverging),
+        scale: Scale::Diverging,
+        title: "leak of indirect irradiance against exact visibility: left without visibility, right with it",
+        unit: "W·m⁻²",
+        missing: "no surface",
+    }
+    .draw()
+    .picture
+}
+
+fn table(report: &RenderReport) -> String {
+    let mut table = Table::new(&[
+        ("method", Column::Text),
+        ("visibility", Column::Text),
+        ("shade", Column::Number),
+        ("rays", Column::Number),
+        ("look-up", Column::Number),
+        ("memory per probe", Column::Number),
+        ("leak light", Column::Number),
+        ("leak dark", Column::Number),
+        ("hidden share", Column::Number),
+        ("irradiance", Column::Number),
+        ("error", Column::Number),
+    ]);
+    let percent = |share: Option<f64>| share.map_or(format::UNDEFINED.to_owned(), format::percent);
+    for method in &report.methods {
+        table.push([
+            "probes".to_owned(),
+            method.name.trim_start_matches("visibility_").to_owned(),
+            format::seconds(method.shade_ms.median / 1e3),
+            format::seconds(method.ray_ms / 1e3),
+            method.lookup_ns.map_or(format::UNDEFINED.to_owned(), |ns| format::seconds(ns / 1e9)),
+            format::bytes(method.bytes_per_probe.round() as u64),
+            percent(method.leak.light),
+            percent(method.leak.dark),
+            percent(method.leak.fraction),
+            method.irradiance_indirect_mean.map_or(format::UNDEFINED.to_owned(), |e| format::significant(e, 4)),
+            format::UNDEFINED.to_owned(),
+        ]);
+    }
+    format!(
+        "camera {}, {}×{}, exposure {:+.2} EV, {} of the points see no probe\n{table}",
+        report.camera,
+        report.width,
+        report.height,
+        report.exposure_ev,
+        format::percent(report.methods.first().map_or(0.0, |m| m.leak.unseen)),
+    )
+}

@@ -1,0 +1,144 @@
+//! An opened OpenEXR file and its blocks of pixels, one at a time.
+//!
+//! No header is believed: what it makes the decoder allocate is bounded by the file's size, or by the block's. Decoding stays on
+//! one thread, because a damaged block must be an error and not a lost worker.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use exr::block::UncompressedBlock;
+use exr::block::chunk::CompressedBlock;
+use exr::block::reader::Reader;
+use exr::error::{Error as ExrError, Result as ExrResult};
+use exr::meta::header::Header;
+use exr::prelude::Compression;
+
+use super::error::ImageError;
+
+const FORMAT: &str = "OpenEXR";
+
+/// Bytes that a byte of a file can stand for: deflate's bound is 1032 (RFC 1951: 258 bytes in 2 bits), doubled for headroom.
+/// The Huffman runs of PIZ (512 bytes in 10 bits) and the other methods stay below.
+const MAX_EXPANSION: u64 = 2 * 1032;
+
+/// DWA packs a flat 8 × 8 block of 16-bit samples into one symbol before it deflates.
+const MAX_EXPANSION_DWA: u64 = 128 * MAX_EXPANSION;
+
+/// Bytes that every block takes at least: its entry in the table of offsets (8), its coordinate (4) and its length (4).
+const MIN_BLOCK_BYTES: u64 = 16;
+
+/// Pixels that a picture may have: 32768 × 16384, an environment map twice as fine as the finest in circulation.
+const MAX_PIXELS: u64 = 1 << 29;
+
+/// Counters that a block of DWA starts with, 64 bits each (OpenEXR, `internal_dwa_compressor.h`); the first is a version and the
+/// last a method, the others are sizes.
+const DWA_COUNTERS: usize = 11;
+
+/// Side of DWA's blocks of samples: edges are padded to it.
+const DWA_BLOCK: usize = 8;
+
+/// A file whose headers have been read and found plausible.
+pub(super) struct ExrFile<'a> {
+    path: &'a Path,
+    reader: Reader<BufReader<File>>,
+}
+
+impl<'a> ExrFile<'a> {
+    /// Opens the file and refuses headers that it is too short for.
+    pub(super) fn open(path: &'a Path) -> Result<ExrFile<'a>, ImageError> {
+        let open_error = |cause| ImageError::Open { path: path.to_owned(), cause };
+        let file = File::open(path).map_err(open_error)?;
+        let metadata = file.metadata().map_err(open_error)?;
+        if !metadata.is_file() {
+            return Err(ImageError::NotAFile { path: path.to_owned() });
+        }
+        // Relaxed: real files bend the rules of the header. The data is held to them.
+        let reader = exr::block::read(BufReader::new(file), false).map_err(|error| exr_error(path, error))?;
+        let file_bytes = metadata.len();
+        for header in reader.headers() {
+            if !is_plausible(header, file_bytes) {
+                let (width, height) = (header.layer_size.width(), header.layer_size.height());
+                return Err(ImageError::ImplausibleSize { path: path.to_owned(), width, height, file_bytes });
+            }
+        }
+        Ok(ExrFile { path, reader })
+    }
+
+    pub(super) fn headers(&self) -> &[Header] {
+        self.reader.headers()
+    }
+
+    /// Hands over each block of one part's full resolution, decompressed.
+    pub(super) fn for_each_block(self, part: usize, mut take: impl FnMut(&UncompressedBlock)) -> Result<(), ImageError> {
+        let path = self.path;
+        let meta = self.reader.meta_data().clone();
+        let header = &meta.headers[part];
+        let mut decode_all = || {
+            let is_wanted = |block_part: usize, is_full_size: bool| block_part == part && is_full_size;
+            let chunks = self
+                .reader
+                .filter_chunks(true, |_, tile, block| is_wanted(block.layer, tile.is_largest_resolution_level()))?;
+            for chunk in chunks {
+                let chunk = chunk?;
+                // A table of offsets may point to another part's block.
+                if chunk.layer_index != part {
+                    return Err(ExrError::Invalid("a block belongs to another part".into()));
+                }
+                check_block(header, &chunk.compressed_block)?;
+                take(&UncompressedBlock::decompress_chunk(chunk, &meta, true)?);
+            }
+            Ok(())
+        };
+        decode_all().map_err(|error| exr_error(path, error))
+    }
+}
+
+fn is_plausible(header: &Header, file_bytes: u64) -> bool {
+    let pixels = (header.layer_size.width() as u64).saturating_mul(header.layer_size.height() as u64);
+    let bytes = pixels.saturating_mul(header.channels.bytes_per_pixel as u64);
+    let expansion = if is_dwa(header) { MAX_EXPANSION_DWA } else { MAX_EXPANSION };
+    pixels <= MAX_PIXELS
+        && bytes <= file_bytes.saturating_mul(expansion)
+        && (header.chunk_count as u64).saturating_mul(MIN_BLOCK_BYTES) <= file_bytes
+}
+
+fn is_dwa(header: &Header) -> bool {
+    matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_))
+}
+
+/// Refuses blocks of DWA whose own counters claim more than the block can hold: the decoder would allocate on their word.
+fn check_block(header: &Header, block: &CompressedBlock) -> ExrResult<()> {
+    let bytes = match block {
+        CompressedBlock::ScanLine(lines) => &lines.compressed_pixels_le,
+        CompressedBlock::Tile(tile) => &tile.compressed_pixels_le,
+        _ => return Ok(()),
+    };
+    if !is_dwa(header) {
+        return Ok(());
+    }
+    let size = header.get_absolute_block_pixel_coordinates(header.get_block_data_indices(block)?)?.size;
+    // What did not get smaller is stored as it was, without counters.
+    if bytes.len() == size.area() * header.channels.bytes_per_pixel {
+        return Ok(());
+    }
+    let padded = size.width().next_multiple_of(DWA_BLOCK) * size.height().next_multiple_of(DWA_BLOCK);
+    // Twice: runs of bytes that do not repeat grow a little.
+    let limit = 2 * padded as u64 * header.channels.bytes_per_pixel as u64;
+    let (counters, _) = bytes.as_chunks::<8>();
+    let sizes = counters.iter().take(DWA_COUNTERS - 1).skip(1).map(|counter| u64::from_le_bytes(*counter));
+    match sizes.max() {
+        Some(largest) if largest > limit => Err(ExrError::Invalid("a block claims more data than it has pixels".into())),
+        _ => Ok(()),
+    }
+}
+
+fn exr_error(path: &Path, error: ExrError) -> ImageError {
+    let path = path.to_owned();
+    match error {
+        ExrError::Io(cause) => ImageError::Open { path, cause },
+        ExrError::NotSupported(reason) => ImageError::Unsupported { path, format: FORMAT, reason: reason.into_owned() },
+        ExrError::Invalid(reason) => ImageError::Damaged { path, format: FORMAT, reason: reason.into_owned() },
+        ExrError::Aborted => ImageError::Damaged { path, format: FORMAT, reason: "reading was aborted".to_owned() },
+    }
+}

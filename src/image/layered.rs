@@ -1,0 +1,101 @@
+//! A picture in several layers: beauty, irradiance, albedo, depth and so on.
+
+use glam::Vec3;
+
+use super::picture::Picture;
+
+/// Name of the layer that plain viewers show.
+pub(super) const BEAUTY: &str = "beauty";
+
+/// Layers of one size, in the order in which they were added; each linear RGB, row 0 at the top.
+///
+/// On disk one EXR part with the channels `layer.R`, `layer.G`, `layer.B`, and plain `R`, `G`, `B` for the layer `beauty`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LayeredImage {
+    pub width: u32,
+    pub height: u32,
+    layers: Vec<(String, Vec<Vec3>)>,
+}
+
+impl LayeredImage {
+    pub fn new(width: u32, height: u32) -> LayeredImage {
+        LayeredImage {
+            width,
+            height,
+            layers: Vec::new(),
+        }
+    }
+
+    /// Adds a layer of colours; a layer of the same name is replaced in its place.
+    ///
+    /// # Panics
+    /// When `pixels` does not hold `width · height` of them.
+    pub fn push(&mut self, name: &str, pixels: Vec<Vec3>) {
+        assert_eq!(
+            pixels.len(),
+            self.width as usize * self.height as usize,
+            "pixels of the layer {name}"
+        );
+        match self
+            .layers
+            .iter_mut()
+            .find(|(existing, _)| existing == name)
+        {
+            Some((_, replaced)) => *replaced = pixels,
+            None => self.layers.push((name.to_owned(), pixels)),
+        }
+    }
+
+    /// Adds a layer of single values, such as depth in metres: R, G and B are equal. Undone by [`LayeredImage::scalar`].
+    ///
+    /// # Panics
+    /// When `values` does not hold `width · height` of them.
+    pub fn push_scalar(&mut self, name: &str, values: &[f32]) {
+        self.push(
+            name,
+            values.iter().map(|&value| Vec3::splat(value)).collect(),
+        );
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.layers.is_empty()
+    }
+
+    /// The layers' names, in order.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.layers.iter().map(|(name, _)| name.as_str())
+    }
+
+    /// The layers, in order.
+    pub fn layers(&self) -> impl Iterator<Item = (&str, &[Vec3])> {
+        self.layers
+            .iter()
+            .map(|(name, pixels)| (name.as_str(), pixels.as_slice()))
+    }
+
+    /// One layer's pixels, row 0 at the top.
+    pub fn layer(&self, name: &str) -> Option<&[Vec3]> {
+        self.layers
+            .iter()
+            .find(|(existing, _)| existing == name)
+            .map(|(_, pixels)| pixels.as_slice())
+    }
+
+    /// One layer's first channel: the values that [`LayeredImage::push_scalar`] was given.
+    pub fn scalar(&self, name: &str) -> Option<Vec<f32>> {
+        self.layer(name)
+            .map(|pixels| pixels.iter().map(|pixel| pixel.x).collect())
+    }
+
+    /// A copy of one layer as a picture.
+    pub fn picture(&self, name: &str) -> Option<Picture> {
+        self.layer(name)
+            .map(|pixels| Picture::from_pixels(self.width, self.height, pixels.to_vec()))
+    }
+
+    /// The layer whose channels are also written as plain R, G, B: `beauty`, else the first.
+    pub(super) fn plain_layer(&self) -> Option<&[Vec3]> {
+        self.layer(BEAUTY)
+            .or_else(|| self.layers.first().map(|(_, pixels)| pixels.as_slice()))
+    }
+}

@@ -1,0 +1,15 @@
+//! Pictures: linear ones in EXR, displayable ones in PNG, and the one way from the first to the second.
+
+mod error;
+mod exr_file;
+mod exr_read;
+mod exr_write;
+mod layered;
+mod picture;
+mod png;
+mod tonemap;
+
+pub use error::ImageError;
+pub use layered::LayeredImage;
+pub use picture::{Picture, Picture8};
+pub use tonemap::{auto_exposure, tonemap};

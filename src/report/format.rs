@@ -1,0 +1,164 @@
+//! Numbers as people read them. All are ASCII apart from "µ" and the dash for what is undefined.
+
+/// What stands for an undefined figure.
+pub const UNDEFINED: &str = "–";
+
+/// Digits that a figure gets in tables: timings and errors are not known better.
+const TABLE_DIGITS: usize = 3;
+
+/// A byte count in B, KiB, MiB, GiB or TiB.
+pub fn bytes(count: u64) -> String {
+    if count < 1024 {
+        return format!("{count} B");
+    }
+    let mut value = count as f64;
+    for unit in ["KiB", "MiB", "GiB"] {
+        value /= 1024.0;
+        // Rounding must not give "1024 KiB".
+        if value < 1023.5 {
+            return format!(
+                "{} {unit}",
+                significant(value, TABLE_DIGITS.max(digits_before_point(value)))
+            );
+        }
+    }
+    format!("{:.2} TiB", value / 1024.0)
+}
+
+/// A time in ns, µs, ms or s, from seconds.
+pub fn seconds(seconds: f64) -> String {
+    if !seconds.is_finite() {
+        return UNDEFINED.to_owned();
+    }
+    let units = [(1.0e-9, "ns"), (1.0e-6, "µs"), (1.0e-3, "ms")];
+    for (scale, unit) in units {
+        let value = seconds / scale;
+        // 999.6 ns would else be rounded to 1000 ns.
+        if value.abs() < 999.5 {
+            return format!("{} {unit}", significant(value, TABLE_DIGITS));
+        }
+    }
+    format!(
+        "{} s",
+        significant(seconds, TABLE_DIGITS.max(digits_before_point(seconds)))
+    )
+}
+
+/// A share as a percentage: 0.0123 gives "1.23 %".
+pub fn percent(share: f64) -> String {
+    if share.is_finite() {
+        format!("{} %", significant(100.0 * share, TABLE_DIGITS))
+    } else {
+        UNDEFINED.to_owned()
+    }
+}
+
+/// A number with this many significant digits (at least 1); powers of ten from 10⁶ on and below 10⁻⁴.
+pub fn significant(value: f64, digits: usize) -> String {
+    if !value.is_finite() {
+        return UNDEFINED.to_owned();
+    }
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let digits = digits.max(1);
+    // Rounded first: 9.996 with three digits is 10.0, which has another exponent.
+    let rounded = format!("{value:.*e}", digits - 1);
+    let exponent: i32 = rounded
+        .rsplit_once('e')
+        .and_then(|(_, exponent)| exponent.parse().ok())
+        .unwrap_or(0);
+    if (-4..6).contains(&exponent) {
+        let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
+        let shown: f64 = rounded.parse().unwrap_or(value);
+        format!("{shown:.decimals$}")
+    } else {
+        rounded
+    }
+}
+
+/// A count with its thousands set apart by thin gaps: 1234567 gives "1 234 567".
+pub fn count(count: u64) -> String {
+    let digits = count.to_string();
+    let mut grouped = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            grouped.push(' ');
+        }
+        grouped.push(digit);
+    }
+    grouped
+}
+
+/// A figure where there is one, else the dash.
+pub fn or_undefined<T>(value: Option<T>, format: impl FnOnce(T) -> String) -> String {
+    value.map_or_else(|| UNDEFINED.to_owned(), format)
+}
+
+/// Digits that a value of at least 1 has before its point, so that 1023 is not shortened to 1020.
+fn digits_before_point(value: f64) -> usize {
+    value.abs().max(1.0).log10().floor() as usize + 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn byte_counts() {
+        let cases = [
+            (0, "0 B"),
+            (1023, "1023 B"),
+            (1024, "1.00 KiB"),
+            (1_047_500, "1023 KiB"),
+            (1_048_575, "1.00 MiB"),
+            (12_345_678, "11.8 MiB"),
+            (u64::MAX, "16777216.00 TiB"),
+        ];
+        for (count, text) in cases {
+            assert_eq!(bytes(count), text);
+        }
+    }
+
+    #[test]
+    fn times() {
+        let cases = [
+            (0.0, "0 ns"),
+            (1.234e-8, "12.3 ns"),
+            (9.996e-7, "1.00 µs"),
+            (0.0123, "12.3 ms"),
+            (1.5, "1.50 s"),
+            (3725.4, "3725 s"),
+            (f64::NAN, "–"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(seconds(value), text);
+        }
+    }
+
+    #[test]
+    fn significant_digits() {
+        let cases = [
+            (9.996, "10.0"),
+            (0.0, "0"),
+            (-0.001_234_5, "-0.00123"),
+            (123_456.0, "123000"),
+            (1.234e-7, "1.23e-7"),
+            (1.0e9, "1.00e9"),
+            (f64::INFINITY, "–"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(significant(value, 3), text);
+        }
+    }
+
+    #[test]
+    fn shares_counts_and_what_is_undefined() {
+        assert_eq!(percent(0.012_34), "1.23 %");
+        assert_eq!(percent(f64::NAN), "–");
+        assert_eq!(count(1_234_567), "1 234 567");
+        assert_eq!(count(12), "12");
+        assert_eq!(or_undefined(None, seconds), "–");
+        assert_eq!(or_undefined(Some(1.0), seconds), "1.00 s");
+    }
+}

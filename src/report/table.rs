@@ -1,0 +1,128 @@
+//! Tables on standard output: lined ones on a terminal, plain columns in a pipe.
+
+use std::fmt;
+use std::io::IsTerminal;
+
+use comfy_table::presets::NOTHING;
+use comfy_table::{
+    Cell, CellAlignment, ContentArrangement, ContentLineStyle, LineStyle, Table as Renderer,
+    TableStyle,
+};
+
+/// Rounded corners, a line below the head, thin lines between the columns.
+const LINED: TableStyle = TableStyle::new()
+    .top_border(LineStyle::new('╭', '─', '┬', '╮'))
+    .header_lines(ContentLineStyle::new('│', '│', '│'))
+    .header_separator(LineStyle::new('├', '─', '┼', '┤'))
+    .content_lines(ContentLineStyle::new('│', '│', '│'))
+    .bottom_border(LineStyle::new('╰', '─', '┴', '╯'));
+
+/// How a column is set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Column {
+    /// Words, from the left.
+    Text,
+    /// Numbers, to the right.
+    Number,
+}
+
+/// Rows of ready strings: [`super::format`] makes them from numbers.
+#[derive(Debug, Clone)]
+pub struct Table {
+    columns: Vec<(String, Column)>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    pub fn new(columns: &[(&str, Column)]) -> Table {
+        Table {
+            columns: columns
+                .iter()
+                .map(|&(name, kind)| (name.to_owned(), kind))
+                .collect(),
+            rows: Vec::new(),
+        }
+    }
+
+    /// Adds a row.
+    ///
+    /// # Panics
+    /// When it does not have a cell for each column.
+    pub fn push<S: Into<String>>(&mut self, row: impl IntoIterator<Item = S>) {
+        let row: Vec<String> = row.into_iter().map(Into::into).collect();
+        assert_eq!(row.len(), self.columns.len(), "cells in a row");
+        self.rows.push(row);
+    }
+
+    /// The whole table, without a line end behind it. On a terminal cells are wrapped where it is too narrow.
+    pub fn render(&self, on_terminal: bool) -> String {
+        let mut renderer = Renderer::new();
+        if on_terminal {
+            renderer
+                .load_style(LINED)
+                .set_content_arrangement(ContentArrangement::Dynamic);
+        } else {
+            renderer.load_style(NOTHING).force_no_tty();
+        }
+        renderer.set_header(self.columns.iter().map(|(name, kind)| cell(name, *kind)));
+        for row in &self.rows {
+            renderer.add_row(
+                row.iter()
+                    .zip(&self.columns)
+                    .map(|(text, (_, kind))| cell(text, *kind)),
+            );
+        }
+        if !on_terminal && let Some(first) = renderer.column_mut(0) {
+            // Lines that start with a blank are a nuisance to cut and sort.
+            first.set_padding((0, 1));
+        }
+        renderer.trim_fmt()
+    }
+}
+
+fn cell(text: &str, kind: Column) -> Cell {
+    Cell::new(text).set_alignment(match kind {
+        Column::Text => CellAlignment::Left,
+        Column::Number => CellAlignment::Right,
+    })
+}
+
+/// As standard output wants it.
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.render(std::io::stdout().is_terminal()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table() -> Table {
+        let mut table = Table::new(&[("method", Column::Text), ("time", Column::Number)]);
+        table.push(["visibility off", "1.25 ms"]);
+        table.push(["on", "–"]);
+        table
+    }
+
+    #[test]
+    fn plain_in_a_pipe() {
+        let expected = "method             time\nvisibility off  1.25 ms\non                    –";
+        assert_eq!(table().render(false), expected);
+    }
+
+    #[test]
+    fn lined_on_a_terminal() {
+        let rendered = table().render(true);
+        let lines: Vec<&str> = rendered.lines().collect();
+        assert_eq!(lines.len(), 6, "{rendered}");
+        assert!(lines[0].starts_with('╭') && lines[0].ends_with('╮'));
+        assert!(lines[1].ends_with("   time │"), "{rendered}");
+        assert!(
+            lines
+                .iter()
+                .all(|line| line.chars().count() == lines[0].chars().count()),
+            "{rendered}"
+        );
+    }
+}

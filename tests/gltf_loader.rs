@@ -13,7 +13,7 @@ use lightprobe::scene::{
 };
 use proptest::prelude::*;
 use rand_pcg::Pcg32;
-use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
+use rand_pcg::rand_core::SeedableRng;
 use serde_json::{Value, json};
 
 const TRIANGLE: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]];

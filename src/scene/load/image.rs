@@ -10,8 +10,8 @@ use crate::scene::material::Texels;
 /// Width and height, pixels.
 const MAX_SIDE: u32 = 16384;
 /// Decoded textures of a scene may hold this many bytes, or [`MAX_RATIO`] times their files' bytes: a JPEG of half a
-/// bit per pixel grows 64-fold, while a PNG made to harm grows a thousandfold.
-const MIN_BUDGET: u64 = 512 << 20;
+/// bit per pixel grows 64-fold, while a PNG made to harm grows a thousandfold. Twice the budget is held for a moment.
+const MIN_BUDGET: u64 = 384 << 20;
 const MAX_RATIO: u64 = 64;
 
 /// What decoded images may still take up.

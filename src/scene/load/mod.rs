@@ -23,6 +23,8 @@ mod transform;
 
 use std::path::Path;
 
+use glam::Vec3;
+
 use self::buffers::Buffers;
 use self::document::Document;
 use self::draws::Draws;
@@ -36,7 +38,7 @@ use self::textures::Textures;
 use self::transform::world_point;
 use super::error::SceneError;
 use super::options::LoadOptions;
-use super::{DroppedTriangles, Scene};
+use super::{DroppedTriangles, Material, Scene};
 
 /// Loads a `.gltf` or `.glb` file with its buffers, its images and the sky.
 ///
@@ -81,6 +83,10 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
     let lights = lights::lights(&document, &nodes, &origin, &mut warnings)?;
     let cameras = lights::cameras(&document, &nodes, &origin, &mut warnings)?;
     let environment = environment::load(options.environment.as_ref(), &mut inputs, &mut warnings)?;
+    let glows = |m: &Material| m.unlit || m.emission != Vec3::ZERO;
+    if lights.is_empty() && environment.is_black() && !materials.materials.iter().any(glows) {
+        warnings.push("nothing in the scene sends out light; give it a sky with --env 1,1,1".to_owned());
+    }
     Ok(Scene {
         name: path.file_stem().map_or_else(|| "scene".to_owned(), |stem| stem.to_string_lossy().into_owned()),
         origin_world: world_point(&landmark, centre),

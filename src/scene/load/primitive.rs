@@ -190,7 +190,7 @@ impl Opened<'_> {
             }
         };
         if self.mode == Mode::Triangles {
-            skipped.incomplete_triangles += usize::from(corners.len() % 3 != 0);
+            skipped.incomplete_triangles += usize::from(!corners.len().is_multiple_of(3));
         }
         Ok(assemble(self.mode, &corners))
     }

@@ -303,7 +303,7 @@ fn leak_map(view: &View, off: &[Vec3], on: &[Vec3]) -> Picture8 {
         height: view.height,
         range: range_of(&values, Scale::Diverging),
         scale: Scale::Diverging,
-        title: "leak of indirect irradiance against exact visibility: left without visibility, right with it",
+        title: "irradiance against exact visibility: left without, right with visibility",
         unit: "W·m⁻²",
         missing: "no surface",
     }

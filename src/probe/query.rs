@@ -63,7 +63,7 @@ pub enum Blend {
 impl Default for QuerySettings {
     fn default() -> Self {
         QuerySettings {
-            direction: DirectionWeight::Wrap { offset: 0.0 },
+            direction: DirectionWeight::Uniform,
             visibility: VisibilitySettings::Surface { voxels_per_cell: 8 },
             trilinear_floor: 0.0,
             weight_floor: 0.0,

@@ -20,9 +20,13 @@ use crate::scene::{Mesh, Scene, TriangleIndex};
 use crate::trace::offset::ray_offset;
 use crate::trace::{Ray, Tracer};
 
-/// Points tried on a surface within one voxel, at first and where these disagree.
+/// Points tried on a surface within one voxel, at first and in all where these disagree.
 const FIRST_POINTS: u32 = 2;
-const MORE_POINTS: u32 = 6;
+const ALL_POINTS: u32 = 8;
+
+/// Points tried on the outside of a surface until one sees any probe: where walls meet, most of a voxel's surface may
+/// lie inside the other wall, and the strip that does not must still be found.
+const SEARCH_POINTS: u32 = 32;
 
 /// Most voxels per cell and axis: 22³·6 keys fit 16 bits.
 pub const MAX_VOXELS_PER_CELL: u32 = 22;
@@ -36,11 +40,21 @@ pub struct SurfaceVisibility {
     pub masks: Vec<u8>,
 }
 
-/// Rays that say "visible", per corner, out of `points`.
+/// Voxels are taken larger by this share on every side when surfaces are sorted into them, so that a surface on the
+/// border of two is known in both, on whichever side of it rounding puts the point that asks.
+const VOXEL_MARGIN: f32 = 0.03;
+
+/// What the points of one triangle in one voxel see.
 #[derive(Debug, Clone, Copy, Default)]
 struct Tally {
+    /// Rays traced.
+    rays: u32,
+    /// Points that see any probe at all. The others lie inside solids where walls meet, and have no vote.
     points: u32,
+    /// Of these, how many see each corner.
     visible: [u32; 8],
+    /// Whether chance found no point of the triangle in the voxel, only its nearest one, which lies on an edge.
+    edge_only: bool,
     /// Whether the outside of a surface faces here (as against the back of one that has only a front).
     outside: bool,
 }
@@ -95,7 +109,7 @@ impl SurfaceVisibility {
             (0..scene.mesh.triangles.len() as u32).into_par_iter().flat_map_iter(|t| survey.triangle(t)).collect();
         // Sums of counts do not depend on the order, so neither does the result.
         entries.par_sort_unstable_by_key(|e| (e.0, e.1));
-        let rays = entries.iter().map(|e| u64::from(e.2.points) * 8).sum();
+        let rays = entries.iter().map(|e| u64::from(e.2.rays)).sum();
         let mut table = SurfaceVisibility { voxels_per_cell, ..Default::default() };
         let cells: usize = grid.cells().to_array().iter().map(|&n| n as usize).product();
         let mut groups = entries.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).peekable();
@@ -103,8 +117,8 @@ impl SurfaceVisibility {
             table.cell_start.push(table.keys.len() as u32);
             while let Some(group) = groups.next_if(|g| g[0].0 == cell) {
                 let mask = majority(group);
-                // The inside of a solid, which nothing sees and nothing asks for.
-                if mask == 0 && !group.iter().any(|e| e.2.outside) {
+                // The inside of a solid, or a voxel that an edge merely touches: nothing there asks.
+                if mask == 0 && !group.iter().any(|e| e.2.outside && !e.2.edge_only) {
                     continue;
                 }
                 table.keys.push(group[0].1);
@@ -116,10 +130,13 @@ impl SurfaceVisibility {
     }
 }
 
+/// Corners that most points see; points on edges vote only where there are no others.
 fn majority(group: &[(u32, u16, Tally)]) -> u8 {
-    let points: u32 = group.iter().map(|e| e.2.points).sum();
+    let only_edges = group.iter().all(|e| e.2.edge_only || e.2.points == 0);
+    let voters = || group.iter().map(|e| &e.2).filter(|t| only_edges || !t.edge_only);
+    let points: u32 = voters().map(|t| t.points).sum();
     (0..8).fold(0, |mask, i| {
-        let visible: u32 = group.iter().map(|e| e.2.visible[i]).sum();
+        let visible: u32 = voters().map(|t| t.visible[i]).sum();
         mask | u8::from(2 * visible > points) << i
     })
 }
@@ -180,8 +197,9 @@ impl Survey<'_> {
         let corners = self.mesh().corners(TriangleIndex(triangle));
         let in_grid = corners.map(|p| self.grid.grid_from_scene(p));
         let cells = self.grid.cells();
-        let low = in_grid[0].min(in_grid[1]).min(in_grid[2]);
-        let high = in_grid[0].max(in_grid[1]).max(in_grid[2]);
+        let margin = VOXEL_MARGIN / self.n as f32;
+        let low = in_grid[0].min(in_grid[1]).min(in_grid[2]) - margin;
+        let high = in_grid[0].max(in_grid[1]).max(in_grid[2]) + margin;
         if high.cmplt(Vec3::ZERO).any() || low.cmpgt(cells.as_vec3()).any() {
             return out;
         }
@@ -193,7 +211,7 @@ impl Survey<'_> {
                 for x in first.x..=past.x {
                     let base = UVec3::new(x, y, z);
                     let local = in_grid.map(|c| c - base.as_vec3());
-                    if triangle_meets_box(local.map(|c| c - 0.5), Vec3::splat(0.5)) {
+                    if triangle_meets_box(local.map(|c| c - 0.5), Vec3::splat(0.5 + VOXEL_MARGIN / self.n as f32)) {
                         self.cell(triangle, &corners, &local, base, &mut out);
                     }
                 }
@@ -217,8 +235,9 @@ impl Survey<'_> {
         }
         let n = self.n as f32;
         let scaled = local.map(|c| c * n);
-        let low = scaled[0].min(scaled[1]).min(scaled[2]).floor().max(Vec3::ZERO).as_uvec3();
-        let high = scaled[0].max(scaled[1]).max(scaled[2]).floor().max(Vec3::ZERO).as_uvec3();
+        let low = scaled[0].min(scaled[1]).min(scaled[2]) - VOXEL_MARGIN;
+        let high = scaled[0].max(scaled[1]).max(scaled[2]) + VOXEL_MARGIN;
+        let (low, high) = (low.floor().max(Vec3::ZERO).as_uvec3(), high.floor().max(Vec3::ZERO).as_uvec3());
         let last = UVec3::splat(self.n - 1);
         let (low, high) = (low.min(last), high.min(last));
         let outward = self.mesh().geometric_normal(TriangleIndex(triangle));
@@ -230,15 +249,15 @@ impl Survey<'_> {
                     let voxel = UVec3::new(x, y, z);
                     let centre = voxel.as_vec3() + 0.5;
                     let around = scaled.map(|c| c - centre);
-                    if !triangle_meets_box(around, Vec3::splat(0.5)) {
+                    if !triangle_meets_box(around, Vec3::splat(0.5 + VOXEL_MARGIN)) {
                         continue;
                     }
                     let stream = u64::from(cell_index) << 16 | u64::from(key(voxel, 0, self.n));
                     for (side, normal) in [(0u64, outward), (1, -outward)] {
                         let mut random =
                             Random::new(self.seed, Purpose::SurfaceVisibility, stream, 2 * u64::from(triangle) + side);
-                        let mut tally = self.tally(corners, &around, normal, base, active, &mut random);
-                        tally.outside = side == 0 || double_sided;
+                        let outside = side == 0 || double_sided;
+                        let tally = self.tally(corners, &around, normal, outside, base, active, &mut random);
                         out.push((cell_index, key(voxel, facing(normal), self.n), tally));
                     }
                 }
@@ -246,46 +265,57 @@ impl Survey<'_> {
         }
     }
 
+    #[allow(clippy::too_many_arguments)]
     /// Rays from points of the triangle within a voxel; `around` are its corners relative to the voxel's centre.
     fn tally(
         &self,
         corners: &[Vec3; 3],
         around: &[Vec3; 3],
         normal: Vec3,
+        outside: bool,
         base: UVec3,
         active: u8,
         random: &mut Random,
     ) -> Tally {
-        let mut tally = Tally::default();
-        for i in 0..FIRST_POINTS + MORE_POINTS {
-            if i == FIRST_POINTS && tally.visible.iter().all(|&v| v == 0 || v == tally.points) {
+        let mut tally = Tally { outside, ..Tally::default() };
+        for tried in 0.. {
+            let enough = match tally.points {
+                _ if tally.edge_only => 1,
+                0 if outside => SEARCH_POINTS,
+                points if tally.visible.iter().all(|&v| v == 0 || v == points) => FIRST_POINTS,
+                _ => ALL_POINTS,
+            };
+            if tried >= enough {
                 break;
             }
-            let barycentric = point_in_voxel(around, random);
+            let (barycentric, inside) = point_in_voxel(around, random);
+            tally.edge_only |= !inside;
             let position =
                 corners[0] + (corners[1] - corners[0]) * barycentric.x + (corners[2] - corners[0]) * barycentric.y;
             let origin = position + normal * ray_offset(corners);
-            tally.points += 1;
+            let mut seen = 0u8;
             for corner in 0..8 {
                 if active >> corner & 1 == 0 {
                     continue;
                 }
                 let probe = self.positions[self.grid.corner(base, corner).0 as usize];
                 // A probe behind the surface is hidden by the surface itself.
-                if (probe - origin).dot(normal) > 0.0
-                    && !self.tracer.occluded(Ray::segment(probe, origin, random.bits()))
-                {
-                    tally.visible[corner as usize] += 1;
+                if (probe - origin).dot(normal) <= 0.0 {
+                    continue;
                 }
+                tally.rays += 1;
+                seen |= u8::from(!self.tracer.occluded(Ray::segment(probe, origin, random.bits()))) << corner;
             }
+            tally.points += u32::from(seen != 0);
+            (0..8).for_each(|corner| tally.visible[corner] += u32::from(seen >> corner & 1));
         }
         tally
     }
 }
 
-/// Barycentric coordinates of a random point of a triangle inside the unit box around the origin; where chance finds
-/// none (slivers, corners), of the triangle's point nearest the box's centre, which lies in the box as they overlap.
-fn point_in_voxel(around: &[Vec3; 3], random: &mut Random) -> Vec2 {
+/// Barycentric coordinates of a random point of a triangle inside the unit box around the origin, and whether there
+/// is one; where chance finds none (slivers, corners), of the triangle's point nearest the box's centre.
+fn point_in_voxel(around: &[Vec3; 3], random: &mut Random) -> (Vec2, bool) {
     /// Tries before a triangle's share of a voxel counts as a sliver.
     const TRIES: usize = 8;
     let (e1, e2) = (around[1] - around[0], around[2] - around[0]);
@@ -297,11 +327,11 @@ fn point_in_voxel(around: &[Vec3; 3], random: &mut Random) -> Vec2 {
         let p = Vec2::new(random.uniform() - 0.5 - around[0][u], random.uniform() - 0.5 - around[0][v]);
         let b = Vec2::new(p.x * e2[v] - p.y * e2[u], e1[u] * p.y - e1[v] * p.x) / determinant;
         let along_axis = around[0][axis] + e1[axis] * b.x + e2[axis] * b.y;
-        if b.x >= 0.0 && b.y >= 0.0 && b.x + b.y <= 1.0 && along_axis.abs() <= 0.5 {
-            return b;
+        if b.x >= 0.0 && b.y >= 0.0 && b.x + b.y <= 1.0 && along_axis.abs() <= 0.5 + VOXEL_MARGIN {
+            return (b, true);
         }
     }
-    nearest_to_origin(around)
+    (nearest_to_origin(around), false)
 }
 
 /// Barycentric coordinates of the point of a triangle nearest the origin (Ericson, *Real-Time Collision Detection*,

@@ -26,22 +26,10 @@ fn main() {
 
 /// The Embree 4 library to link, or what to do about its absence.
 fn find_embree() -> Result<PathBuf, String> {
-    if let Some(dir) = env::var_os("EMBREE_DIR")
-        .filter(|dir| !dir.is_empty())
-        .map(PathBuf::from)
-    {
+    if let Some(dir) = env::var_os("EMBREE_DIR").filter(|dir| !dir.is_empty()).map(PathBuf::from) {
         let arch = format!("lib/{}-linux-gnu", cargo_var("CARGO_CFG_TARGET_ARCH"));
-        return first_in([
-            dir.clone(),
-            dir.join("lib"),
-            dir.join("lib64"),
-            dir.join(arch),
-        ])
-        .ok_or_else(|| {
-            format!(
-                "EMBREE_DIR={} holds no {LIBRARY}, there or in lib: correct or unset it",
-                dir.display()
-            )
+        return first_in([dir.clone(), dir.join("lib"), dir.join("lib64"), dir.join(arch)]).ok_or_else(|| {
+            format!("EMBREE_DIR={} holds no {LIBRARY}, there or in lib: correct or unset it", dir.display())
         });
     }
     first_in([Path::new(&cargo_var("CARGO_MANIFEST_DIR")).join(".deps/embree/lib")])
@@ -57,10 +45,8 @@ fn first_in(folders: impl IntoIterator<Item = PathBuf>) -> Option<PathBuf> {
 
 /// `libembree4.so` in `folder`, else a versioned name such as `libembree4.so.4`, which comes without development files.
 fn embree_in(folder: &Path) -> Option<PathBuf> {
-    let is_embree = |name: &str| {
-        name.starts_with("libembree4.so.")
-            || (name.starts_with("libembree4-") && name.contains(".so"))
-    };
+    let is_embree =
+        |name: &str| name.starts_with("libembree4.so.") || (name.starts_with("libembree4-") && name.contains(".so"));
     let exact = folder.join(LIBRARY);
     if exact.is_file() {
         return Some(exact);
@@ -85,30 +71,15 @@ fn system_folders() -> Vec<PathBuf> {
     let by_compiler = answer("cc", &[&format!("-print-file-name={LIBRARY}")])
         .filter(|file| file.is_absolute()) // else it echoes the name
         .map(|file| file.with_file_name(""));
-    let custom = [
-        "/usr/local/lib",
-        "/usr/local/lib64",
-        "/usr/lib",
-        "/usr/lib64",
-    ]
-    .map(PathBuf::from);
+    let custom = ["/usr/local/lib", "/usr/local/lib64", "/usr/lib", "/usr/lib64"].map(PathBuf::from);
     let multiarch = PathBuf::from(format!("/usr/lib/{arch}-linux-gnu"));
-    by_pkg_config
-        .into_iter()
-        .chain(by_compiler)
-        .chain(custom)
-        .chain([multiarch])
-        .collect()
+    by_pkg_config.into_iter().chain(by_compiler).chain(custom).chain([multiarch]).collect()
 }
 
 fn link(library: &Path) -> io::Result<()> {
     let real = library.canonicalize()?;
     let real_folder = real.parent().unwrap_or(Path::new("/"));
-    let search = if library.ends_with(LIBRARY) {
-        library.with_file_name("")
-    } else {
-        symlink_in_out_dir(&real)?
-    };
+    let search = if library.ends_with(LIBRARY) { library.with_file_name("") } else { symlink_in_out_dir(&real)? };
     println!("cargo::rustc-link-search=native={}", search.display());
 
     if cargo_var("CARGO_CFG_TARGET_OS") == "linux" {

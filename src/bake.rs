@@ -89,9 +89,8 @@ pub fn prepare<'w, 's>(
     let mut survey_rays = placement.rays;
     let surface = voxels.map(|voxels| {
         let seed = circumstances.seed;
-        let (table, rays) = SurfaceVisibility::measure(
-            world.scene, &world.tracer, &grid, &placement.states, &positions, voxels, seed,
-        );
+        let (table, rays) =
+            SurfaceVisibility::measure(world.scene, &world.tracer, &grid, &placement.states, &positions, voxels, seed);
         survey_rays += rays;
         table
     });
@@ -255,11 +254,7 @@ impl Prepared<'_, '_> {
         let wanted = matches!(config.query.visibility, VisibilitySettings::Moments { .. })
             && (self.plan.visibility || config.plan == PlanMode::KeepEverything);
         wanted.then(|| {
-            Kernel::lobe(
-                config.capture.resolution,
-                config.filter.distance_resolution,
-                config.filter.distance_exponent,
-            )
+            Kernel::lobe(config.capture.resolution, config.filter.distance_resolution, config.filter.distance_exponent)
         })
     }
 
@@ -277,8 +272,7 @@ impl Prepared<'_, '_> {
         let active = self.active();
         let bar = circumstances.progress.stage("capturing", active.len());
         let mut stored: Vec<Option<ProbeCapture>> = (0..probes).map(|_| None).collect();
-        let mut distance =
-            kernel.map(|_| OctahedralMaps::new(probes, filter.distance_resolution, border, Vec2::ZERO));
+        let mut distance = kernel.map(|_| OctahedralMaps::new(probes, filter.distance_resolution, border, Vec2::ZERO));
         let mut bytes = 0;
         for chunk in active.chunks(REPLAY_CHUNK) {
             let traced: Vec<(ProbeCapture, Option<Vec<Vec2>>)> = chunk

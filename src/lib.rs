@@ -13,18 +13,18 @@
 //! | 6 edge | [`config`], [`plan`], [`cli`], [`commands`] | what was asked, what is done about it |
 #![deny(unsafe_code)]
 
+pub mod bake;
+pub mod cli;
+pub mod commands;
 pub mod config;
+pub mod image;
 pub mod light;
 pub mod math;
 pub mod output;
-pub mod probe;
-pub mod scene;
-pub mod trace;
-pub mod bake;
 pub mod plan;
+pub mod probe;
 pub mod progress;
 pub mod report;
-pub mod cli;
-pub mod commands;
-pub mod image;
+pub mod scene;
 pub mod shade;
+pub mod trace;

@@ -27,7 +27,8 @@ impl Progress {
             return ProgressBar::hidden();
         }
         let bar = ProgressBar::with_draw_target(Some(length as u64), ProgressDrawTarget::stderr());
-        let style = ProgressStyle::with_template("{prefix:>12} {bar:40} {percent:>3} %  {elapsed_precise}, {eta} left {msg}");
+        let style =
+            ProgressStyle::with_template("{prefix:>12} {bar:40} {percent:>3} %  {elapsed_precise}, {eta} left {msg}");
         if let Ok(style) = style {
             bar.set_style(style);
         }

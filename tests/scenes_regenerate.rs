@@ -13,15 +13,8 @@ fn scenes_in(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         .map(|entry| entry.expect("a folder that can be listed").path())
         .filter(|path| path.extension().is_some_and(|extension| extension == "glb"))
         .map(|path| {
-            let name = path
-                .file_name()
-                .expect("a file")
-                .to_string_lossy()
-                .into_owned();
-            (
-                name,
-                fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display())),
-            )
+            let name = path.file_name().expect("a file").to_string_lossy().into_owned();
+            (name, fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display())))
         })
         .collect()
 }
@@ -30,36 +23,21 @@ fn scenes_in(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 fn scenes_are_what_the_script_writes() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let run = Command::new("python3")
-        .arg(root.join("scripts/make_scenes.py"))
-        .arg("--out")
-        .arg(folder.path())
-        .output();
+    let run = Command::new("python3").arg(root.join("scripts/make_scenes.py")).arg("--out").arg(folder.path()).output();
     let output = match run {
         Err(error) if error.kind() == ErrorKind::NotFound => {
             // Not eprintln!, whose output cargo hides when a test passes.
-            let _ = writeln!(
-                std::io::stderr(),
-                "SKIPPED scenes_are_what_the_script_writes: no python3"
-            );
+            let _ = writeln!(std::io::stderr(), "SKIPPED scenes_are_what_the_script_writes: no python3");
             return;
         }
         run => run.expect("python3 that starts"),
     };
-    assert!(
-        output.status.success(),
-        "make_scenes.py failed:\n{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "make_scenes.py failed:\n{}", String::from_utf8_lossy(&output.stderr));
 
     let stored = scenes_in(&root.join("scenes"));
     let written = scenes_in(folder.path());
     let names = |scenes: &BTreeMap<String, Vec<u8>>| scenes.keys().cloned().collect::<Vec<_>>();
-    assert_eq!(
-        names(&stored),
-        names(&written),
-        "scenes/ holds other scenes than make_scenes.py writes"
-    );
+    assert_eq!(names(&stored), names(&written), "scenes/ holds other scenes than make_scenes.py writes");
     for (name, bytes) in &written {
         // assert! and not assert_eq!, which would print both files.
         assert!(

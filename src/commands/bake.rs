@@ -40,11 +40,8 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     let accel_build_s = accel_started.elapsed().as_secs_f64();
     warn_if_dark(&world, path, console);
 
-    let circumstances = Circumstances {
-        seed: args.trace.seed,
-        memory_budget_bytes: args.memory_budget,
-        progress: console.progress,
-    };
+    let circumstances =
+        Circumstances { seed: args.trace.seed, memory_budget_bytes: args.memory_budget, progress: console.progress };
     let prepared = prepare(&world, &config, &circumstances)?;
     if args.dry_run {
         return dry_run(&prepared, &circumstances, console);
@@ -120,12 +117,8 @@ fn dry_run(prepared: &Prepared, circumstances: &Circumstances, console: &Console
 }
 
 fn plan_table(lines: &[Line]) -> String {
-    let mut table = Table::new(&[
-        ("stage", Column::Text),
-        ("", Column::Text),
-        ("why", Column::Text),
-        ("saved", Column::Number),
-    ]);
+    let mut table =
+        Table::new(&[("stage", Column::Text), ("", Column::Text), ("why", Column::Text), ("saved", Column::Number)]);
     for line in lines {
         let saved = [line.saved_bytes.map(format::bytes), line.saved_s.map(format::seconds)];
         let saved: Vec<String> = saved.into_iter().flatten().collect();
@@ -186,7 +179,8 @@ fn report(
 fn warn_about(report: &BakeReport, console: &Console) {
     let numerics = &report.numerics;
     if report.probes_active == 0 {
-        console.warn("no probe is active: all lie inside geometry or where no surface can sample them; change the grid");
+        console
+            .warn("no probe is active: all lie inside geometry or where no surface can sample them; change the grid");
     }
     if numerics.hits_outside_volume > 0 {
         console.warn(format!(
@@ -214,7 +208,8 @@ fn warn_about(report: &BakeReport, console: &Console) {
 fn summary(report: &BakeReport, output: &Path) -> String {
     let t = &report.time_s;
     let mut table = Table::new(&[("bake", Column::Text), ("", Column::Number)]);
-    let rate = |r: Option<f64>| r.map_or(format::UNDEFINED.to_owned(), |r| format!("{} M/s", format::significant(r / 1e6, 3)));
+    let rate =
+        |r: Option<f64>| r.map_or(format::UNDEFINED.to_owned(), |r| format!("{} M/s", format::significant(r / 1e6, 3)));
     for (name, value) in [
         ("probes (active)", format!("{} ({})", report.probes, report.probes_active)),
         ("rays", format!("{} M", format::significant((report.rays.primary + report.rays.shadow) as f64 / 1e6, 3))),
@@ -232,7 +227,10 @@ fn summary(report: &BakeReport, output: &Path) -> String {
     }
     if let Some(raw) = report.raw_embree_rays_per_s {
         let share = report.rays_per_s.map_or(0.0, |r| r / raw);
-        table.push(["bare Embree".to_owned(), format!("{} ({} of it reached)", rate(Some(raw)), format::percent(share))]);
+        table.push([
+            "bare Embree".to_owned(),
+            format!("{} ({} of it reached)", rate(Some(raw)), format::percent(share)),
+        ]);
     }
     format!("{}\n{}\nwrote {}", table, plan_summary(&report.plan), output.display())
 }
@@ -241,4 +239,3 @@ fn plan_summary(lines: &[Line]) -> String {
     let left_out: Vec<&str> = lines.iter().filter(|l| !l.kept).map(|l| l.stage).collect();
     if left_out.is_empty() { "left out: nothing".to_owned() } else { format!("left out: {}", left_out.join(", ")) }
 }
-

@@ -74,7 +74,8 @@ fn to_json(file: &ProbeFile, probe: Option<u32>) -> Value {
     });
     if let Some(p) = probe {
         let index = ProbeIndex(p);
-        let irradiance: Value = axes(volume, index).into_iter().map(|(n, e)| (n.to_owned(), json!(e.to_array()))).collect();
+        let irradiance: Value =
+            axes(volume, index).into_iter().map(|(n, e)| (n.to_owned(), json!(e.to_array()))).collect();
         out["probe"] = json!({
             "index": p,
             "position_m": position_world(volume, index),

@@ -15,41 +15,22 @@ pub enum ImageError {
     #[error("cannot open {path}: it is not a regular file; give the name of a file")]
     NotAFile { path: PathBuf },
     #[error("cannot read {path}: {reason}; is it a whole {format} file? Export or copy it again")]
-    Damaged {
-        path: PathBuf,
-        format: &'static str,
-        reason: String,
-    },
+    Damaged { path: PathBuf, format: &'static str, reason: String },
     #[error("cannot read {path}: {reason}; save it as a plain {format} file")]
-    Unsupported {
-        path: PathBuf,
-        format: &'static str,
-        reason: String,
-    },
+    Unsupported { path: PathBuf, format: &'static str, reason: String },
     #[error(
         "cannot read {path}: its header claims {width} × {height} pixels, too many for a file of {file_bytes} bytes; \
          the file is damaged: export or copy it again"
     )]
-    ImplausibleSize {
-        path: PathBuf,
-        width: usize,
-        height: usize,
-        file_bytes: u64,
-    },
-    #[error(
-        "cannot read {path}: it has no channels R, G and B, only {channels}; export it with colour"
-    )]
+    ImplausibleSize { path: PathBuf, width: usize, height: usize, file_bytes: u64 },
+    #[error("cannot read {path}: it has no channels R, G and B, only {channels}; export it with colour")]
     NoColor { path: PathBuf, channels: String },
     #[error(
         "cannot write {path}: the layer name {name:?} is not 1 to 200 ASCII letters, digits or underscores; rename it"
     )]
     LayerName { path: PathBuf, name: String },
     #[error("cannot write {path}: a picture of {width} × {height} pixels has none; give it a size")]
-    Empty {
-        path: PathBuf,
-        width: u32,
-        height: u32,
-    },
+    Empty { path: PathBuf, width: u32, height: u32 },
     #[error(transparent)]
     Output(#[from] OutputError),
 }

@@ -70,7 +70,11 @@ impl<'a> ExrFile<'a> {
     }
 
     /// Hands over each block of one part's full resolution, decompressed.
-    pub(super) fn for_each_block(self, part: usize, mut take: impl FnMut(&UncompressedBlock)) -> Result<(), ImageError> {
+    pub(super) fn for_each_block(
+        self,
+        part: usize,
+        mut take: impl FnMut(&UncompressedBlock),
+    ) -> Result<(), ImageError> {
         let path = self.path;
         let meta = self.reader.meta_data().clone();
         let header = &meta.headers[part];
@@ -128,7 +132,9 @@ fn check_block(header: &Header, block: &CompressedBlock) -> ExrResult<()> {
     let (counters, _) = bytes.as_chunks::<8>();
     let sizes = counters.iter().take(DWA_COUNTERS - 1).skip(1).map(|counter| u64::from_le_bytes(*counter));
     match sizes.max() {
-        Some(largest) if largest > limit => Err(ExrError::Invalid("a block claims more data than it has pixels".into())),
+        Some(largest) if largest > limit => {
+            Err(ExrError::Invalid("a block claims more data than it has pixels".into()))
+        }
         _ => Ok(()),
     }
 }

@@ -81,11 +81,7 @@ fn layers_of(header: &Header) -> BTreeMap<String, [usize; 3]> {
     found.into_iter().filter_map(whole).collect()
 }
 
-fn read_layers(
-    file: ExrFile<'_>,
-    part: usize,
-    wanted: BTreeMap<String, [usize; 3]>,
-) -> Result<Vec<Layer>, ImageError> {
+fn read_layers(file: ExrFile<'_>, part: usize, wanted: BTreeMap<String, [usize; 3]>) -> Result<Vec<Layer>, ImageError> {
     let header = &file.headers()[part];
     let (size, channels) = (header.layer_size, header.channels.clone());
     let blank = |(name, channels)| Layer { name, channels, pixels: vec![Vec3::ZERO; size.area()] };

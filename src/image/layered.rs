@@ -19,11 +19,7 @@ pub struct LayeredImage {
 
 impl LayeredImage {
     pub fn new(width: u32, height: u32) -> LayeredImage {
-        LayeredImage {
-            width,
-            height,
-            layers: Vec::new(),
-        }
+        LayeredImage { width, height, layers: Vec::new() }
     }
 
     /// Adds a layer of colours; a layer of the same name is replaced in its place.
@@ -31,16 +27,8 @@ impl LayeredImage {
     /// # Panics
     /// When `pixels` does not hold `width · height` of them.
     pub fn push(&mut self, name: &str, pixels: Vec<Vec3>) {
-        assert_eq!(
-            pixels.len(),
-            self.width as usize * self.height as usize,
-            "pixels of the layer {name}"
-        );
-        match self
-            .layers
-            .iter_mut()
-            .find(|(existing, _)| existing == name)
-        {
+        assert_eq!(pixels.len(), self.width as usize * self.height as usize, "pixels of the layer {name}");
+        match self.layers.iter_mut().find(|(existing, _)| existing == name) {
             Some((_, replaced)) => *replaced = pixels,
             None => self.layers.push((name.to_owned(), pixels)),
         }
@@ -51,10 +39,7 @@ impl LayeredImage {
     /// # Panics
     /// When `values` does not hold `width · height` of them.
     pub fn push_scalar(&mut self, name: &str, values: &[f32]) {
-        self.push(
-            name,
-            values.iter().map(|&value| Vec3::splat(value)).collect(),
-        );
+        self.push(name, values.iter().map(|&value| Vec3::splat(value)).collect());
     }
 
     pub fn is_empty(&self) -> bool {
@@ -68,34 +53,26 @@ impl LayeredImage {
 
     /// The layers, in order.
     pub fn layers(&self) -> impl Iterator<Item = (&str, &[Vec3])> {
-        self.layers
-            .iter()
-            .map(|(name, pixels)| (name.as_str(), pixels.as_slice()))
+        self.layers.iter().map(|(name, pixels)| (name.as_str(), pixels.as_slice()))
     }
 
     /// One layer's pixels, row 0 at the top.
     pub fn layer(&self, name: &str) -> Option<&[Vec3]> {
-        self.layers
-            .iter()
-            .find(|(existing, _)| existing == name)
-            .map(|(_, pixels)| pixels.as_slice())
+        self.layers.iter().find(|(existing, _)| existing == name).map(|(_, pixels)| pixels.as_slice())
     }
 
     /// One layer's first channel: the values that [`LayeredImage::push_scalar`] was given.
     pub fn scalar(&self, name: &str) -> Option<Vec<f32>> {
-        self.layer(name)
-            .map(|pixels| pixels.iter().map(|pixel| pixel.x).collect())
+        self.layer(name).map(|pixels| pixels.iter().map(|pixel| pixel.x).collect())
     }
 
     /// A copy of one layer as a picture.
     pub fn picture(&self, name: &str) -> Option<Picture> {
-        self.layer(name)
-            .map(|pixels| Picture::from_pixels(self.width, self.height, pixels.to_vec()))
+        self.layer(name).map(|pixels| Picture::from_pixels(self.width, self.height, pixels.to_vec()))
     }
 
     /// The layer whose channels are also written as plain R, G, B: `beauty`, else the first.
     pub(super) fn plain_layer(&self) -> Option<&[Vec3]> {
-        self.layer(BEAUTY)
-            .or_else(|| self.layers.first().map(|(_, pixels)| pixels.as_slice()))
+        self.layer(BEAUTY).or_else(|| self.layers.first().map(|(_, pixels)| pixels.as_slice()))
     }
 }

@@ -16,26 +16,14 @@ pub struct Picture {
 impl Picture {
     /// A black picture.
     pub fn new(width: u32, height: u32) -> Picture {
-        Picture {
-            width,
-            height,
-            pixels: vec![Vec3::ZERO; width as usize * height as usize],
-        }
+        Picture { width, height, pixels: vec![Vec3::ZERO; width as usize * height as usize] }
     }
 
     /// # Panics
     /// When `pixels` does not hold `width · height` of them.
     pub fn from_pixels(width: u32, height: u32, pixels: Vec<Vec3>) -> Picture {
-        assert_eq!(
-            pixels.len(),
-            width as usize * height as usize,
-            "pixels of a {width}x{height} picture"
-        );
-        Picture {
-            width,
-            height,
-            pixels,
-        }
+        assert_eq!(pixels.len(), width as usize * height as usize, "pixels of a {width}x{height} picture");
+        Picture { width, height, pixels }
     }
 
     /// # Panics
@@ -52,11 +40,7 @@ impl Picture {
     /// What a screen shows at this exposure: see [`tonemap`].
     pub fn tonemapped(&self, exposure_ev: f32) -> Picture8 {
         let displayed = |&pixel| tonemap(pixel, exposure_ev).to_array().map(byte_from_unit);
-        Picture8 {
-            width: self.width,
-            height: self.height,
-            pixels: self.pixels.iter().map(displayed).collect(),
-        }
+        Picture8 { width: self.width, height: self.height, pixels: self.pixels.iter().map(displayed).collect() }
     }
 }
 
@@ -71,11 +55,7 @@ pub struct Picture8 {
 impl Picture8 {
     /// A picture of one colour.
     pub fn filled(width: u32, height: u32, color: [u8; 3]) -> Picture8 {
-        Picture8 {
-            width,
-            height,
-            pixels: vec![color; width as usize * height as usize],
-        }
+        Picture8 { width, height, pixels: vec![color; width as usize * height as usize] }
     }
 
     /// # Panics
@@ -87,9 +67,6 @@ impl Picture8 {
 
 fn index(width: u32, height: u32, x: u32, y: u32) -> usize {
     // Without this, an x too large would wrap into the next row.
-    assert!(
-        x < width && y < height,
-        "pixel ({x}, {y}) of a {width}x{height} picture"
-    );
+    assert!(x < width && y < height, "pixel ({x}, {y}) of a {width}x{height} picture");
     y as usize * width as usize + x as usize
 }

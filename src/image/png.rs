@@ -20,11 +20,7 @@ impl Picture8 {
     /// Those of [`write_atomically`], and a picture without pixels.
     pub fn write_png(&self, path: &Path) -> Result<(), ImageError> {
         if self.pixels.is_empty() {
-            return Err(ImageError::Empty {
-                path: path.to_owned(),
-                width: self.width,
-                height: self.height,
-            });
+            return Err(ImageError::Empty { path: path.to_owned(), width: self.width, height: self.height });
         }
         Ok(write_atomically(path, |file| self.encode_png(file))?)
     }
@@ -34,15 +30,12 @@ impl Picture8 {
     /// # Errors
     /// Those of `writer`.
     pub fn encode_png(&self, writer: impl Write) -> io::Result<()> {
-        let encoder =
-            PngEncoder::new_with_quality(writer, CompressionType::Default, FilterType::Adaptive);
+        let encoder = PngEncoder::new_with_quality(writer, CompressionType::Default, FilterType::Adaptive);
         let bytes = self.pixels.as_flattened();
-        encoder
-            .write_image(bytes, self.width, self.height, ExtendedColorType::Rgb8)
-            .map_err(|error| match error {
-                image::ImageError::IoError(error) => error,
-                other => io::Error::other(other),
-            })
+        encoder.write_image(bytes, self.width, self.height, ExtendedColorType::Rgb8).map_err(|error| match error {
+            image::ImageError::IoError(error) => error,
+            other => io::Error::other(other),
+        })
     }
 
     /// Reads a PNG of any kind: grey becomes RGB, 16 bits become 8, transparency is dropped.
@@ -50,23 +43,12 @@ impl Picture8 {
     /// # Errors
     /// A file that cannot be opened, is damaged, or is larger than the decoder's limit of 512 MiB.
     pub fn read_png(path: &Path) -> Result<Picture8, ImageError> {
-        let file = File::open(path).map_err(|cause| ImageError::Open {
-            path: path.to_owned(),
-            cause,
+        let file = File::open(path).map_err(|cause| ImageError::Open { path: path.to_owned(), cause })?;
+        let decoded = ImageReader::with_format(BufReader::new(file), ImageFormat::Png).decode().map_err(|error| {
+            ImageError::Damaged { path: path.to_owned(), format: FORMAT, reason: error.to_string() }
         })?;
-        let decoded = ImageReader::with_format(BufReader::new(file), ImageFormat::Png)
-            .decode()
-            .map_err(|error| ImageError::Damaged {
-                path: path.to_owned(),
-                format: FORMAT,
-                reason: error.to_string(),
-            })?;
         let rgb = decoded.into_rgb8();
         let (width, height) = rgb.dimensions();
-        Ok(Picture8 {
-            width,
-            height,
-            pixels: rgb.pixels().map(|pixel| pixel.0).collect(),
-        })
+        Ok(Picture8 { width, height, pixels: rgb.pixels().map(|pixel| pixel.0).collect() })
     }
 }

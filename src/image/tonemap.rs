@@ -20,11 +20,7 @@ const CURVE_SATURATED: f32 = 16.0;
 /// by channel. Negative and NaN show as 0, infinity as 1.
 pub fn tonemap(pixel: Vec3, exposure_ev: f32) -> Vec3 {
     let gain = exposure_ev.exp2();
-    Vec3::from_array(
-        pixel
-            .to_array()
-            .map(|channel| srgb_from_linear(tone_curve(channel * gain))),
-    )
+    Vec3::from_array(pixel.to_array().map(|channel| srgb_from_linear(tone_curve(channel * gain))))
 }
 
 /// The filmic curve of K. Narkowicz, "ACES Filmic Tone Mapping Curve" (2015), as published (without the optional factor 0.6):
@@ -41,10 +37,7 @@ fn tone_curve(x: f32) -> f32 {
 /// Black, negative and non-finite luminances do not count, nor does what lies 13 stops below the median of the rest: sky-less
 /// backgrounds and unlit rooms would else decide. A black picture gives 0.
 pub fn auto_exposure(luminances: impl IntoIterator<Item = f32>) -> f32 {
-    let mut lit: Vec<f32> = luminances
-        .into_iter()
-        .filter(|l| l.is_finite() && *l > 0.0)
-        .collect();
+    let mut lit: Vec<f32> = luminances.into_iter().filter(|l| l.is_finite() && *l > 0.0).collect();
     if lit.is_empty() {
         return 0.0;
     }
@@ -70,11 +63,7 @@ mod tests {
         for i in -2000..=2000 {
             let x = (i as f32 * 0.05).exp2();
             let shown = tonemap(Vec3::splat(x), 0.0);
-            assert!(
-                shown.x >= last && shown.x <= 1.0,
-                "{x} shows as {}",
-                shown.x
-            );
+            assert!(shown.x >= last && shown.x <= 1.0, "{x} shows as {}", shown.x);
             assert!(shown.x == shown.y && shown.y == shown.z);
             last = shown.x;
         }
@@ -112,16 +101,7 @@ mod tests {
 
     #[test]
     fn exposure_ignores_black_and_what_is_no_light() {
-        let odd = [
-            0.0,
-            -1.0,
-            f32::NAN,
-            f32::INFINITY,
-            1.0e-20,
-            0.18,
-            0.18,
-            0.18,
-        ];
+        let odd = [0.0, -1.0, f32::NAN, f32::INFINITY, 1.0e-20, 0.18, 0.18, 0.18];
         assert!(auto_exposure(odd).abs() < 1e-6);
         assert_eq!(auto_exposure([]), 0.0);
         assert_eq!(auto_exposure([0.0, f32::NAN]), 0.0);

@@ -42,13 +42,50 @@ pub struct LightSample {
 
 /// All that emits, ready for sampling.
 pub struct Emitters {
-    triangles: Vec<TriangleIndex>,
-    /// Per entry of `triangles`: probability of the triangle ÷ its area, m⁻².
-    density_per_area: Vec<f32>,
+    triangles: Vec<EmissiveTriangle>,
     /// Entry of `triangles` plus one of every scene triangle that emits, 0 for the others; empty if none emits.
     entry_of_triangle: Vec<u32>,
     alias: Option<WeightedAliasIndex<f64>>,
     sky: Option<Sky>,
+}
+
+/// What sampling needs of a triangle, together in memory.
+struct EmissiveTriangle {
+    corner: Vec3,
+    edges: [Vec3; 2],
+    normal: Vec3,
+    ray_offset: f32,
+    /// Probability of the triangle ÷ its area, m⁻².
+    density_per_area: f32,
+    double_sided: bool,
+    /// Emitted radiance times opacity where no texture changes it, W·m⁻²·sr⁻¹.
+    radiance: Option<Vec3>,
+    index: TriangleIndex,
+}
+
+impl EmissiveTriangle {
+    fn new(scene: &Scene, index: TriangleIndex, probability: f64) -> EmissiveTriangle {
+        let corners = scene.mesh.corners(index);
+        let material = scene.material(index);
+        let textured = material.emission_texture.is_some()
+            || material.base_color_texture.is_some()
+            || !scene.mesh.colors.is_empty();
+        let radiance = (!textured).then(|| scene.emission(index, Vec2::ZERO) * scene.opacity(index, Vec2::ZERO));
+        EmissiveTriangle {
+            corner: corners[0],
+            edges: [corners[1] - corners[0], corners[2] - corners[0]],
+            normal: scene.mesh.geometric_normal(index),
+            ray_offset: ray_offset(&corners),
+            density_per_area: (probability / f64::from(scene.mesh.area(index))) as f32,
+            double_sided: material.double_sided,
+            radiance,
+            index,
+        }
+    }
+
+    fn point(&self, barycentric: Vec2) -> Vec3 {
+        self.corner + self.edges[0] * barycentric.x + self.edges[1] * barycentric.y
+    }
 }
 
 enum Sky {
@@ -62,28 +99,25 @@ enum Sky {
 
 impl Emitters {
     pub fn new(scene: &Scene) -> Emitters {
-        let mut triangles = Vec::new();
-        let mut weights = Vec::new();
-        for triangle in (0..scene.mesh.triangles.len() as u32).map(TriangleIndex) {
-            let power = f64::from(estimated_power(scene, triangle));
-            if power > 0.0 && power.is_finite() {
-                triangles.push(triangle);
-                weights.push(power);
-            }
-        }
-        let total: f64 = weights.iter().sum();
-        let density_per_area =
-            triangles.iter().zip(&weights).map(|(&t, w)| (w / total / f64::from(scene.mesh.area(t))) as f32).collect();
+        let candidates = (0..scene.mesh.triangles.len() as u32).map(TriangleIndex);
+        let powers: Vec<(TriangleIndex, f64)> = candidates
+            .map(|t| (t, f64::from(estimated_power(scene, t))))
+            .filter(|(_, power)| *power > 0.0 && power.is_finite())
+            .collect();
+        let total: f64 = powers.iter().map(|p| p.1).sum();
+        let triangles: Vec<EmissiveTriangle> =
+            powers.iter().map(|&(t, power)| EmissiveTriangle::new(scene, t, power / total)).collect();
         let mut entry_of_triangle = Vec::new();
         if !triangles.is_empty() {
             entry_of_triangle = vec![0; scene.mesh.triangles.len()];
             for (entry, t) in triangles.iter().enumerate() {
-                entry_of_triangle[t.0 as usize] = entry as u32 + 1;
+                entry_of_triangle[t.index.0 as usize] = entry as u32 + 1;
             }
         }
+        let weights = powers.into_iter().map(|p| p.1).collect();
         // Fails only without positive weights: then there is nothing to sample.
         let alias = WeightedAliasIndex::new(weights).ok();
-        Emitters { triangles, density_per_area, entry_of_triangle, alias, sky: Sky::new(&scene.environment) }
+        Emitters { triangles, entry_of_triangle, alias, sky: Sky::new(&scene.environment) }
     }
 
     pub fn is_empty(&self) -> bool {
@@ -115,34 +149,35 @@ impl Emitters {
             let radiance = scene.environment.radiance(direction);
             return Some(LightSample { direction, target: None, radiance, density: density * sky_share });
         }
-        let entry = random.pick(self.alias.as_ref()?);
-        let triangle = self.triangles[entry];
+        let triangle = &self.triangles[random.pick(self.alias.as_ref()?)];
         let barycentric = triangle_barycentric(Vec2::new(random.uniform(), random.uniform()));
-        let target = scene.mesh.interpolate(&scene.mesh.positions, triangle, barycentric);
+        let target = triangle.point(barycentric);
         let to_target = target - point;
         let distance_squared = to_target.length_squared();
         let direction = to_target.try_normalize()?;
-        let outward = scene.mesh.geometric_normal(triangle);
-        let cosine = -outward.dot(direction);
-        if cosine <= 0.0 && !scene.material(triangle).double_sided {
+        let cosine = -triangle.normal.dot(direction);
+        if cosine <= 0.0 && !triangle.double_sided {
             return None;
         }
-        let density = self.density_per_area[entry] * (1.0 - sky_share) * distance_squared / cosine.abs();
+        let density = triangle.density_per_area * (1.0 - sky_share) * distance_squared / cosine.abs();
         if !density.is_finite() {
             return None;
         }
+        let radiance = triangle.radiance.unwrap_or_else(|| {
+            scene.emission(triangle.index, barycentric) * scene.opacity(triangle.index, barycentric)
+        });
         // Stop short of the emitter itself, on the side that faces the point.
-        let offset = ray_offset(&scene.mesh.corners(triangle)) * cosine.signum();
-        let radiance = scene.emission(triangle, barycentric) * scene.opacity(triangle, barycentric);
-        Some(LightSample { direction, target: Some(target + outward * offset), radiance, density })
+        let target = target + triangle.normal * (triangle.ray_offset * cosine.signum());
+        Some(LightSample { direction, target: Some(target), radiance, density })
     }
 
     /// Density with which [`Self::sample`] would have drawn this hit along unit `direction` from `point`, sr⁻¹.
-    pub fn density_of_hit(&self, scene: &Scene, point: Vec3, direction: Vec3, hit: &Hit) -> f32 {
+    pub fn density_of_hit(&self, point: Vec3, direction: Vec3, hit: &Hit) -> f32 {
         let Some(&entry @ 1..) = self.entry_of_triangle.get(hit.triangle.0 as usize) else { return 0.0 };
-        let position = scene.mesh.interpolate(&scene.mesh.positions, hit.triangle, hit.barycentric);
-        let cosine = scene.mesh.geometric_normal(hit.triangle).dot(direction).abs();
-        self.density_per_area[entry as usize - 1] * (1.0 - self.sky_share()) * position.distance_squared(point) / cosine
+        let triangle = &self.triangles[entry as usize - 1];
+        let cosine = triangle.normal.dot(direction).abs();
+        let distance_squared = triangle.point(hit.barycentric).distance_squared(point);
+        triangle.density_per_area * (1.0 - self.sky_share()) * distance_squared / cosine
     }
 
     /// Density with which [`Self::sample`] would have drawn the sky along unit `direction`, sr⁻¹.

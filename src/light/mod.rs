@@ -9,12 +9,14 @@ pub mod surface;
 use crate::scene::Scene;
 use crate::trace::{TraceError, Tracer};
 use emitters::Emitters;
+use surface::SurfaceTable;
 
 /// What one needs to ask about light in a scene: the scene itself, rays, and the means to sample its emitters.
 pub struct World<'s> {
     pub scene: &'s Scene,
     pub tracer: Tracer<'s>,
     pub emitters: Emitters,
+    pub surfaces: SurfaceTable,
     /// Factor on all punctual lights (some exporters multiply them by 683 and emission not).
     pub punctual_scale: f32,
     /// Largest albedo allowed per channel; larger ones are clamped to it, so that bounces converge.
@@ -24,7 +26,14 @@ pub struct World<'s> {
 impl<'s> World<'s> {
     pub fn new(scene: &'s Scene, punctual_scale: f32, albedo_max: f32) -> Result<World<'s>, TraceError> {
         let tracer = Tracer::build(scene)?;
-        Ok(World { scene, tracer, emitters: Emitters::new(scene), punctual_scale, albedo_max })
+        Ok(World {
+            scene,
+            tracer,
+            emitters: Emitters::new(scene),
+            surfaces: SurfaceTable::new(scene),
+            punctual_scale,
+            albedo_max,
+        })
     }
 
     /// Whether anything but punctual lights sends out light.

@@ -96,7 +96,10 @@ impl World<'_> {
             let radiance = self.scene.environment.radiance(ray.direction);
             return (radiance, self.emitters.density_of_sky(self.scene, ray.direction));
         };
-        let surface = self.surface_at(hit, ray.direction);
-        (surface.emission, self.emitters.density_of_hit(self.scene, ray.origin, ray.direction, &hit))
+        let radiance = self.emission_towards(&hit, ray.direction);
+        if radiance == Vec3::ZERO {
+            return (radiance, 0.0);
+        }
+        (radiance, self.emitters.density_of_hit(ray.origin, ray.direction, &hit))
     }
 }

@@ -1,6 +1,7 @@
 //! A point on a surface, as the ray sees it that found it.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 
 use super::World;
 use crate::scene::{Scene, TriangleIndex};
@@ -39,6 +40,78 @@ impl SurfacePoint {
     }
 }
 
+/// What shading needs of a triangle, in one cache line: hits are scattered over the scene, and fetching their vertices
+/// one by one took as long as Embree took to find them.
+#[derive(Debug, Clone, Copy)]
+struct TriangleRecord {
+    corner: Vec3,
+    edges: [Vec3; 2],
+    /// Of the front, unit.
+    normal: Vec3,
+    ray_offset: f32,
+    /// Whether vertex normals differ from the geometric one.
+    smooth: bool,
+    emits: bool,
+    double_sided: bool,
+    /// Index into [`SurfaceTable::constants`].
+    material: u32,
+}
+
+/// What is the same all over a material; `None` where a texture or vertex colours decide.
+#[derive(Debug, Clone, Copy)]
+struct MaterialConstants {
+    albedo: Option<Vec3>,
+    emission: Option<Vec3>,
+}
+
+/// Shading data of all triangles.
+#[derive(Debug)]
+pub struct SurfaceTable {
+    triangles: Vec<TriangleRecord>,
+    constants: Vec<MaterialConstants>,
+}
+
+/// Vertex normals within this angle (radians) of the geometric normal are those of a flat triangle: f32 rounding.
+const FLAT_ANGLE: f32 = 1e-5;
+
+impl SurfaceTable {
+    pub fn new(scene: &Scene) -> SurfaceTable {
+        let constants = scene.materials.iter().enumerate().map(|(m, material)| {
+            let uniform = material.base_color_texture.is_none() && scene.mesh.colors.is_empty();
+            let any = || scene.mesh.materials.iter().position(|t| t.0 as usize == m);
+            let triangle = any().map(|t| TriangleIndex(t as u32));
+            let albedo = uniform && (material.unlit || material.metallic_roughness_texture.is_none());
+            let emission = if material.unlit { uniform } else { material.emission_texture.is_none() };
+            MaterialConstants {
+                albedo: triangle.filter(|_| albedo).map(|t| scene.albedo(t, Vec2::ZERO)),
+                emission: triangle.filter(|_| emission).map(|t| scene.emission(t, Vec2::ZERO)),
+            }
+        });
+        let constants: Vec<MaterialConstants> = constants.collect();
+        let record = |t: u32| {
+            let triangle = TriangleIndex(t);
+            let corners = scene.mesh.corners(triangle);
+            let normal = scene.mesh.geometric_normal(triangle);
+            let vertices = scene.mesh.triangles[t as usize].map(|v| scene.mesh.normals[v as usize]);
+            let flat = vertices.iter().all(|n| n.distance(normal) <= FLAT_ANGLE || *n == Vec3::ZERO);
+            let material = scene.material(triangle);
+            let index = scene.mesh.materials[t as usize].0;
+            TriangleRecord {
+                corner: corners[0],
+                edges: [corners[1] - corners[0], corners[2] - corners[0]],
+                normal,
+                ray_offset: ray_offset(&corners),
+                smooth: !flat,
+                emits: constants[index as usize].emission != Some(Vec3::ZERO),
+                double_sided: material.double_sided,
+                material: index,
+            }
+        };
+        let triangles = (0..scene.mesh.triangles.len() as u32).into_par_iter().map(record).collect();
+        SurfaceTable { triangles, constants }
+    }
+}
+
 impl World<'_> {
     /// The surface that `ray` meets.
     pub fn surface(&self, ray: Ray) -> Option<SurfacePoint> {
@@ -47,30 +120,50 @@ impl World<'_> {
 
     /// The surface of a hit found along `direction`.
     pub fn surface_at(&self, hit: Hit, direction: Vec3) -> SurfacePoint {
-        let scene = self.scene;
-        let (triangle, barycentric) = (hit.triangle, hit.barycentric);
-        let corners = scene.mesh.corners(triangle);
-        let outward = scene.mesh.geometric_normal(triangle);
-        let front = outward.dot(direction) <= 0.0;
-        let geometric_normal = if front { outward } else { -outward };
-        let material = scene.material(triangle);
+        let record = &self.surfaces.triangles[hit.triangle.0 as usize];
+        let front = record.normal.dot(direction) <= 0.0;
+        let geometric_normal = if front { record.normal } else { -record.normal };
+        let albedo = match self.surfaces.constants[record.material as usize].albedo {
+            Some(albedo) => albedo,
+            None => self.scene.albedo(hit.triangle, hit.barycentric),
+        };
         SurfacePoint {
-            position: scene.mesh.interpolate(&scene.mesh.positions, triangle, barycentric),
+            position: record.corner + record.edges[0] * hit.barycentric.x + record.edges[1] * hit.barycentric.y,
             geometric_normal,
-            shading_normal: shading_normal(scene, &hit, geometric_normal),
+            shading_normal: if record.smooth {
+                shading_normal(self.scene, &hit, geometric_normal)
+            } else {
+                geometric_normal
+            },
             front,
-            double_sided: material.double_sided,
-            albedo: scene.albedo(triangle, barycentric).min(Vec3::splat(self.albedo_max)),
-            emission: if emits(scene, triangle, front) { scene.emission(triangle, barycentric) } else { Vec3::ZERO },
-            ray_offset: ray_offset(&corners),
+            double_sided: record.double_sided,
+            albedo: albedo.min(Vec3::splat(self.albedo_max)),
+            emission: self.emission_at(&hit, front),
+            ray_offset: record.ray_offset,
             hit,
         }
     }
-}
 
-/// Whether this side of a triangle emits what its material emits.
-pub fn emits(scene: &Scene, triangle: TriangleIndex, front: bool) -> bool {
-    front || scene.material(triangle).double_sided
+    /// Radiance that the front (or back) of a surface emits at a hit, W·m⁻²·sr⁻¹.
+    fn emission_at(&self, hit: &Hit, front: bool) -> Vec3 {
+        let record = &self.surfaces.triangles[hit.triangle.0 as usize];
+        if !record.emits || !(front || record.double_sided) {
+            return Vec3::ZERO;
+        }
+        match self.surfaces.constants[record.material as usize].emission {
+            Some(emission) => emission,
+            None => self.scene.emission(hit.triangle, hit.barycentric),
+        }
+    }
+
+    /// Radiance that a hit emits against `direction`, W·m⁻²·sr⁻¹.
+    pub fn emission_towards(&self, hit: &Hit, direction: Vec3) -> Vec3 {
+        let record = &self.surfaces.triangles[hit.triangle.0 as usize];
+        if !record.emits {
+            return Vec3::ZERO;
+        }
+        self.emission_at(hit, record.normal.dot(direction) <= 0.0)
+    }
 }
 
 /// The interpolated vertex normal on the viewer's side, the geometric one where there is none.

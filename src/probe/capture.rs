@@ -195,7 +195,7 @@ impl Capture<'_, '_> {
         };
         out.distances[texel].add(f64::from(surface.hit.t.min(self.distance_clamp_m)), f64::from(weight));
         if surface.emission != Vec3::ZERO {
-            let light_density = world.emitters.density_of_hit(world.scene, position, direction, &surface.hit);
+            let light_density = world.emitters.density_of_hit(position, direction, &surface.hit);
             out.emitted[texel] += surface.emission * (gathered_share(light_density) * weight);
         }
         let normal = surface.shading_normal;

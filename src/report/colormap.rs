@@ -91,21 +91,12 @@ mod tests {
     #[test]
     fn odd_ranges_and_values_have_a_colour() {
         for scale in [Scale::Sequential, Scale::Diverging] {
-            for range in [
-                [0.0, 0.0],
-                [3.0, 1.0],
-                [f32::NAN, 1.0],
-                [f32::MIN, f32::MAX],
-                [f32::MAX, f32::MAX],
-            ] {
+            for range in [[0.0, 0.0], [3.0, 1.0], [f32::NAN, 1.0], [f32::MIN, f32::MAX], [f32::MAX, f32::MAX]] {
                 let [low, high] = Colormap::new(scale, range).range();
                 assert!(low < high, "{scale:?} {range:?}");
             }
             assert_eq!(Colormap::new(scale, [0.0, 1.0]).color(f32::NAN), MISSING);
-            assert_eq!(
-                Colormap::new(scale, [0.0, 1.0]).color(f32::INFINITY),
-                MISSING
-            );
+            assert_eq!(Colormap::new(scale, [0.0, 1.0]).color(f32::INFINITY), MISSING);
         }
     }
 }

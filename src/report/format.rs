@@ -16,10 +16,7 @@ pub fn bytes(count: u64) -> String {
         value /= 1024.0;
         // Rounding must not give "1024 KiB".
         if value < 1023.5 {
-            return format!(
-                "{} {unit}",
-                significant(value, TABLE_DIGITS.max(digits_before_point(value)))
-            );
+            return format!("{} {unit}", significant(value, TABLE_DIGITS.max(digits_before_point(value))));
         }
     }
     format!("{:.2} TiB", value / 1024.0)
@@ -38,19 +35,12 @@ pub fn seconds(seconds: f64) -> String {
             return format!("{} {unit}", significant(value, TABLE_DIGITS));
         }
     }
-    format!(
-        "{} s",
-        significant(seconds, TABLE_DIGITS.max(digits_before_point(seconds)))
-    )
+    format!("{} s", significant(seconds, TABLE_DIGITS.max(digits_before_point(seconds))))
 }
 
 /// A share as a percentage: 0.0123 gives "1.23 %".
 pub fn percent(share: f64) -> String {
-    if share.is_finite() {
-        format!("{} %", significant(100.0 * share, TABLE_DIGITS))
-    } else {
-        UNDEFINED.to_owned()
-    }
+    if share.is_finite() { format!("{} %", significant(100.0 * share, TABLE_DIGITS)) } else { UNDEFINED.to_owned() }
 }
 
 /// A number with this many significant digits (at least 1); powers of ten from 10⁶ on and below 10⁻⁴.
@@ -64,10 +54,7 @@ pub fn significant(value: f64, digits: usize) -> String {
     let digits = digits.max(1);
     // Rounded first: 9.996 with three digits is 10.0, which has another exponent.
     let rounded = format!("{value:.*e}", digits - 1);
-    let exponent: i32 = rounded
-        .rsplit_once('e')
-        .and_then(|(_, exponent)| exponent.parse().ok())
-        .unwrap_or(0);
+    let exponent: i32 = rounded.rsplit_once('e').and_then(|(_, exponent)| exponent.parse().ok()).unwrap_or(0);
     if (-4..6).contains(&exponent) {
         let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
         let shown: f64 = rounded.parse().unwrap_or(value);

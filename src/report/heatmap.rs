@@ -53,12 +53,7 @@ impl Heatmap<'_> {
     /// # Panics
     /// When `values` does not hold `width · height` of them.
     pub fn draw(&self) -> DrawnHeatmap {
-        assert_eq!(
-            self.values.len(),
-            self.width as usize * self.height as usize,
-            "values of the map {}",
-            self.title
-        );
+        assert_eq!(self.values.len(), self.width as usize * self.height as usize, "values of the map {}", self.title);
         let colormap = Colormap::new(self.scale, self.range);
         let map_scale = enlargement(self.width, self.height);
         let zoom = (self.width * map_scale).div_ceil(WIDTH_PER_ZOOM).max(1);
@@ -66,31 +61,13 @@ impl Heatmap<'_> {
         let width = map_size.0.max(legend::MIN_WIDTH);
         let mut picture = Picture8::filled(width, map_size.1 + legend::HEIGHT * zoom, SURROUND);
 
-        let pixels = self
-            .values
-            .iter()
-            .map(|&value| colormap.color(value))
-            .collect();
-        let colors = Picture8 {
-            width: self.width,
-            height: self.height,
-            pixels,
-        };
-        let map = Rect {
-            x: (width - map_size.0) / 2,
-            y: 0,
-            width: map_size.0,
-            height: map_size.1,
-        };
+        let pixels = self.values.iter().map(|&value| colormap.color(value)).collect();
+        let colors = Picture8 { width: self.width, height: self.height, pixels };
+        let map = Rect { x: (width - map_size.0) / 2, y: 0, width: map_size.0, height: map_size.1 };
         paste(&mut picture, &colors, map.x, map.y, map_scale);
 
         let bar = self.legend(colormap).draw(&mut picture, map_size.1, zoom);
-        DrawnHeatmap {
-            picture,
-            map,
-            map_scale,
-            bar,
-        }
+        DrawnHeatmap { picture, map, map_scale, bar }
     }
 
     fn legend(&self, colormap: Colormap) -> Legend<'_> {
@@ -100,15 +77,8 @@ impl Heatmap<'_> {
             title: self.title,
             unit: self.unit,
             colormap,
-            missing: self
-                .values
-                .iter()
-                .any(|value| !value.is_finite())
-                .then_some(self.missing),
-            beyond: [
-                finite().any(|&value| value < low),
-                finite().any(|&value| value > high),
-            ],
+            missing: self.values.iter().any(|value| !value.is_finite()).then_some(self.missing),
+            beyond: [finite().any(|&value| value < low), finite().any(|&value| value > high)],
         }
     }
 }
@@ -116,18 +86,13 @@ impl Heatmap<'_> {
 /// A range for these values: from 0 (sequential) or its negative (diverging) to the round number above 99.5 % of the magnitudes
 /// that are not 0. Without any such, 0 to 1.
 pub fn range_of(values: &[f32], scale: Scale) -> [f32; 2] {
-    let mut magnitudes: Vec<f32> = values
-        .iter()
-        .map(|value| value.abs())
-        .filter(|m| m.is_finite() && *m > 0.0)
-        .collect();
+    let mut magnitudes: Vec<f32> =
+        values.iter().map(|value| value.abs()).filter(|m| m.is_finite() && *m > 0.0).collect();
     let high = if magnitudes.is_empty() {
         1.0
     } else {
         let rank = (RANGE_PERCENTILE * (magnitudes.len() - 1) as f64).ceil() as usize;
-        round_up(f64::from(
-            *magnitudes.select_nth_unstable_by(rank, f32::total_cmp).1,
-        )) as f32
+        round_up(f64::from(*magnitudes.select_nth_unstable_by(rank, f32::total_cmp).1)) as f32
     };
     // Rounding up may leave f32 at its very top.
     let high = high.min(f32::MAX);
@@ -142,8 +107,5 @@ fn enlargement(width: u32, height: u32) -> u32 {
     if width == 0 || height == 0 {
         return 1;
     }
-    legend::MIN_WIDTH
-        .div_ceil(width)
-        .min(MAX_ENLARGED_HEIGHT / height)
-        .max(1)
+    legend::MIN_WIDTH.div_ceil(width).min(MAX_ENLARGED_HEIGHT / height).max(1)
 }

@@ -55,38 +55,16 @@ impl Legend<'_> {
     /// `zoom` ≥ 1 enlarges everything.
     pub fn draw(&self, picture: &mut Picture8, top: u32, zoom: u32) -> Rect {
         let width = picture.width;
-        fill(
-            picture,
-            Rect {
-                x: 0,
-                y: top,
-                width,
-                height: HEIGHT * zoom,
-            },
-            BACKGROUND,
-        );
-        fill(
-            picture,
-            Rect {
-                x: 0,
-                y: top,
-                width,
-                height: zoom,
-            },
-            HAIRLINE,
-        );
+        fill(picture, Rect { x: 0, y: top, width, height: HEIGHT * zoom }, BACKGROUND);
+        fill(picture, Rect { x: 0, y: top, width, height: zoom }, HAIRLINE);
 
         let title_right = self.draw_missing(picture, top, zoom);
         self.draw_title(picture, top, title_right, zoom);
 
         // The triangles hang over into the margin, so that the bars of two pictures line up.
         let x = MARGIN * zoom;
-        let bar = Rect {
-            x,
-            y: top + BAR_TOP * zoom,
-            width: width.saturating_sub(2 * x).max(1),
-            height: BAR_HEIGHT * zoom,
-        };
+        let bar =
+            Rect { x, y: top + BAR_TOP * zoom, width: width.saturating_sub(2 * x).max(1), height: BAR_HEIGHT * zoom };
         self.draw_bar(picture, bar, zoom);
         self.draw_ticks(picture, bar, top, zoom);
         bar
@@ -100,25 +78,10 @@ impl Legend<'_> {
         };
         let em_px = LABEL_EM * zoom as f32;
         let baseline = top + TITLE_BASELINE * zoom;
-        draw_text(
-            picture,
-            name,
-            TextStyle {
-                em_px,
-                color: PALE_INK,
-            },
-            right,
-            baseline as f32,
-            Anchor::Right,
-        );
+        draw_text(picture, name, TextStyle { em_px, color: PALE_INK }, right, baseline as f32, Anchor::Right);
         let size = SWATCH * zoom;
         let left = right - text_width(name, em_px) - (SWATCH + 6) as f32 * zoom as f32;
-        let swatch = Rect {
-            x: left.max(0.0) as u32,
-            y: baseline + zoom - size,
-            width: size,
-            height: size,
-        };
+        let swatch = Rect { x: left.max(0.0) as u32, y: baseline + zoom - size, width: size, height: size };
         fill(picture, swatch, MISSING);
         left - LABEL_GAP * zoom as f32
     }
@@ -126,49 +89,23 @@ impl Legend<'_> {
     fn draw_title(&self, picture: &mut Picture8, top: u32, right: f32, zoom: u32) {
         let left = (MARGIN * zoom) as f32;
         let baseline = (top + TITLE_BASELINE * zoom) as f32;
-        let unit = if self.unit.is_empty() {
-            String::new()
-        } else {
-            format!("  {}", self.unit)
-        };
+        let unit = if self.unit.is_empty() { String::new() } else { format!("  {}", self.unit) };
         let whole = format!("{}{unit}", self.title);
         let room = (right - left).max(0.0);
         let wanted = TITLE_EM * zoom as f32;
         // A little too long is set smaller; much too long is cut.
-        let em_px = (wanted * room / text_width(&whole, wanted).max(1.0))
-            .clamp(TITLE_MIN_EM * zoom as f32, wanted);
+        let em_px = (wanted * room / text_width(&whole, wanted).max(1.0)).clamp(TITLE_MIN_EM * zoom as f32, wanted);
         let title = fitted(self.title, em_px, room - text_width(&unit, em_px));
-        draw_text(
-            picture,
-            &title,
-            TextStyle { em_px, color: INK },
-            left,
-            baseline,
-            Anchor::Left,
-        );
+        draw_text(picture, &title, TextStyle { em_px, color: INK }, left, baseline, Anchor::Left);
         let after = left + text_width(&title, em_px);
-        draw_text(
-            picture,
-            &unit,
-            TextStyle {
-                em_px,
-                color: PALE_INK,
-            },
-            after,
-            baseline,
-            Anchor::Left,
-        );
+        draw_text(picture, &unit, TextStyle { em_px, color: PALE_INK }, after, baseline, Anchor::Left);
     }
 
     fn draw_bar(&self, picture: &mut Picture8, bar: Rect, zoom: u32) {
         frame(picture, bar, zoom, PALE_INK);
         for column in 0..bar.width {
             let share = f64::from(column) / f64::from((bar.width - 1).max(1));
-            let rect = Rect {
-                x: bar.x + column,
-                width: 1,
-                ..bar
-            };
+            let rect = Rect { x: bar.x + column, width: 1, ..bar };
             fill(picture, rect, self.colormap.color_at(share));
         }
         let (top, bottom) = (bar.y as f32, (bar.y + bar.height) as f32);
@@ -186,11 +123,7 @@ impl Legend<'_> {
                     (base, bottom + zoom as f32),
                 ];
                 fill_triangle(picture, outer, PALE_INK);
-                fill_triangle(
-                    picture,
-                    [(base, top), (tip, middle), (base, bottom)],
-                    self.colormap.color_at(share),
-                );
+                fill_triangle(picture, [(base, top), (tip, middle), (base, bottom)], self.colormap.color_at(share));
             }
         }
     }
@@ -199,8 +132,7 @@ impl Legend<'_> {
         let em_px = LABEL_EM * zoom as f32;
         let baseline = (top + LABEL_BASELINE * zoom) as f32;
         let [low, high] = self.colormap.range().map(f64::from);
-        let position =
-            |value: f64| bar.x as f64 + (value - low) / (high - low) * f64::from(bar.width - 1);
+        let position = |value: f64| bar.x as f64 + (value - low) / (high - low) * f64::from(bar.width - 1);
         let tick_top = bar.y + bar.height + zoom;
         for (value, label) in self.ticks_that_fit(bar, em_px, zoom) {
             let centre = position(value) + 0.5;
@@ -211,21 +143,9 @@ impl Legend<'_> {
                 }
             }
             // Centred on the number: a sign would else push it off its tick.
-            let sign = label
-                .chars()
-                .next()
-                .filter(|first| "+−".contains(*first))
-                .map(String::from)
-                .unwrap_or_default();
+            let sign = label.chars().next().filter(|first| "+−".contains(*first)).map(String::from).unwrap_or_default();
             let x = centre as f32 - 0.5 * text_width(&sign, em_px);
-            draw_text(
-                picture,
-                &label,
-                TextStyle { em_px, color: INK },
-                x,
-                baseline,
-                Anchor::Centre,
-            );
+            draw_text(picture, &label, TextStyle { em_px, color: INK }, x, baseline, Anchor::Centre);
         }
     }
 
@@ -234,31 +154,17 @@ impl Legend<'_> {
         let [low, high] = self.colormap.range().map(f64::from);
         let signed = self.colormap.scale() == Scale::Diverging;
         let fits = |ticks: &Vec<(f64, String)>| {
-            let widest = ticks
-                .iter()
-                .map(|(_, label)| text_width(label, em_px))
-                .fold(0.0, f32::max);
+            let widest = ticks.iter().map(|(_, label)| text_width(label, em_px)).fold(0.0, f32::max);
             let spacing = bar.width as f32 / (ticks.len().max(2) - 1) as f32;
             widest + LABEL_GAP * zoom as f32 <= spacing
         };
         let near = |a: f64, b: f64| (a - b).abs() < 1.0e-6 * (high - low);
         let hits_both_ends = |ticks: &Vec<(f64, String)>| {
-            ticks.first().is_some_and(|tick| near(tick.0, low))
-                && ticks.last().is_some_and(|tick| near(tick.0, high))
+            ticks.first().is_some_and(|tick| near(tick.0, low)) && ticks.last().is_some_and(|tick| near(tick.0, high))
         };
-        let mut fitting: Vec<_> = (1..=MAX_TICKS)
-            .rev()
-            .map(|at_most| ticks(low, high, at_most, signed))
-            .filter(fits)
-            .collect();
-        let best = fitting
-            .iter()
-            .position(|ticks| ticks.len() >= ENOUGH_TICKS && hits_both_ends(ticks))
-            .unwrap_or(0);
-        if fitting.is_empty() {
-            Vec::new()
-        } else {
-            fitting.swap_remove(best)
-        }
+        let mut fitting: Vec<_> =
+            (1..=MAX_TICKS).rev().map(|at_most| ticks(low, high, at_most, signed)).filter(fits).collect();
+        let best = fitting.iter().position(|ticks| ticks.len() >= ENOUGH_TICKS && hits_both_ends(ticks)).unwrap_or(0);
+        if fitting.is_empty() { Vec::new() } else { fitting.swap_remove(best) }
     }
 }

@@ -5,8 +5,7 @@ use std::io::IsTerminal;
 
 use comfy_table::presets::NOTHING;
 use comfy_table::{
-    Cell, CellAlignment, ContentArrangement, ContentLineStyle, LineStyle, Table as Renderer,
-    TableStyle,
+    Cell, CellAlignment, ContentArrangement, ContentLineStyle, LineStyle, Table as Renderer, TableStyle,
 };
 
 /// Rounded corners, a line below the head, thin lines between the columns.
@@ -35,13 +34,7 @@ pub struct Table {
 
 impl Table {
     pub fn new(columns: &[(&str, Column)]) -> Table {
-        Table {
-            columns: columns
-                .iter()
-                .map(|&(name, kind)| (name.to_owned(), kind))
-                .collect(),
-            rows: Vec::new(),
-        }
+        Table { columns: columns.iter().map(|&(name, kind)| (name.to_owned(), kind)).collect(), rows: Vec::new() }
     }
 
     /// Adds a row.
@@ -58,19 +51,13 @@ impl Table {
     pub fn render(&self, on_terminal: bool) -> String {
         let mut renderer = Renderer::new();
         if on_terminal {
-            renderer
-                .load_style(LINED)
-                .set_content_arrangement(ContentArrangement::Dynamic);
+            renderer.load_style(LINED).set_content_arrangement(ContentArrangement::Dynamic);
         } else {
             renderer.load_style(NOTHING).force_no_tty();
         }
         renderer.set_header(self.columns.iter().map(|(name, kind)| cell(name, *kind)));
         for row in &self.rows {
-            renderer.add_row(
-                row.iter()
-                    .zip(&self.columns)
-                    .map(|(text, (_, kind))| cell(text, *kind)),
-            );
+            renderer.add_row(row.iter().zip(&self.columns).map(|(text, (_, kind))| cell(text, *kind)));
         }
         if !on_terminal && let Some(first) = renderer.column_mut(0) {
             // Lines that start with a blank are a nuisance to cut and sort.
@@ -118,11 +105,6 @@ mod tests {
         assert_eq!(lines.len(), 6, "{rendered}");
         assert!(lines[0].starts_with('╭') && lines[0].ends_with('╮'));
         assert!(lines[1].ends_with("   time │"), "{rendered}");
-        assert!(
-            lines
-                .iter()
-                .all(|line| line.chars().count() == lines[0].chars().count()),
-            "{rendered}"
-        );
+        assert!(lines.iter().all(|line| line.chars().count() == lines[0].chars().count()), "{rendered}");
     }
 }

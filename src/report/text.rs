@@ -27,14 +27,7 @@ pub fn text_width(text: &str, em_px: f32) -> f32 {
 }
 
 /// Draws one line of text with its baseline at `baseline_y` and its left end, middle or right end at `x`.
-pub fn draw_text(
-    picture: &mut Picture8,
-    text: &str,
-    style: TextStyle,
-    x: f32,
-    baseline_y: f32,
-    anchor: Anchor,
-) {
+pub fn draw_text(picture: &mut Picture8, text: &str, style: TextStyle, x: f32, baseline_y: f32, anchor: Anchor) {
     let (glyphs, width) = lay_out(text, style.em_px);
     let left = match anchor {
         Anchor::Left => x,
@@ -47,10 +40,7 @@ pub fn draw_text(
         if let Some(outline) = FONT.outline_glyph(glyph) {
             let bounds = outline.px_bounds();
             outline.draw(|column, row, coverage| {
-                let (x, y) = (
-                    bounds.min.x as i64 + i64::from(column),
-                    bounds.min.y as i64 + i64::from(row),
-                );
+                let (x, y) = (bounds.min.x as i64 + i64::from(column), bounds.min.y as i64 + i64::from(row));
                 blend(picture, x, y, style.color, coverage);
             });
         }
@@ -97,10 +87,7 @@ mod tests {
 
     #[test]
     fn text_stays_within_its_measure() {
-        let style = TextStyle {
-            em_px: 14.0,
-            color: [255; 3],
-        };
+        let style = TextStyle { em_px: 14.0, color: [255; 3] };
         let text = "Hamburg 0.25";
         let mut picture = Picture8::filled(200, 40, [0; 3]);
         draw_text(&mut picture, text, style, 20.0, 25.0, Anchor::Left);
@@ -109,20 +96,14 @@ mod tests {
         // Side bearings are about a tenth of an em.
         assert!((20..23).contains(&first), "{first}");
         let end = 20.0 + text_width(text, 14.0);
-        assert!(
-            (last as f32) < end && last as f32 > end - 3.0,
-            "{last} of {end}"
-        );
+        assert!((last as f32) < end && last as f32 > end - 3.0, "{last} of {end}");
     }
 
     #[test]
     fn long_text_is_shortened_to_fit() {
         assert_eq!(fitted("short", 12.0, 100.0), "short");
         let shortened = fitted("a very long title that cannot fit", 12.0, 80.0);
-        assert!(
-            shortened.ends_with('…') && text_width(&shortened, 12.0) <= 80.0,
-            "{shortened}"
-        );
+        assert!(shortened.ends_with('…') && text_width(&shortened, 12.0) <= 80.0, "{shortened}");
         assert_eq!(fitted("W", 12.0, 1.0), "");
     }
 }

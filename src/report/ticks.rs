@@ -20,23 +20,12 @@ pub fn ticks(low: f64, high: f64, at_most: usize, signed: bool) -> Vec<(f64, Str
     let first = ((low - slack) / step).ceil() as i64;
     let last = ((high + slack) / step).floor() as i64;
     let exponent = common_exponent(low.abs().max(high.abs()));
-    (first..=last)
-        .map(|i| {
-            (
-                i as f64 * step,
-                label(i as f64 * step, step, exponent, signed),
-            )
-        })
-        .collect()
+    (first..=last).map(|i| (i as f64 * step, label(i as f64 * step, step, exponent, signed))).collect()
 }
 
 /// The smallest round number whose magnitude is not below that of `value`; 0 and what is no number stay.
 pub fn round_up(value: f64) -> f64 {
-    if value.is_normal() {
-        value.signum() * round_magnitude(value.abs(), ENDS)
-    } else {
-        value
-    }
+    if value.is_normal() { value.signum() * round_magnitude(value.abs(), ENDS) } else { value }
 }
 
 /// The smallest of `mantissas` times a power of ten that is not below `raw` > 0.
@@ -49,11 +38,7 @@ fn round_magnitude(raw: f64, mantissas: &[f64]) -> f64 {
 
 /// The power of ten that all labels of an axis share; 0 where plain numbers read well.
 fn common_exponent(magnitude: f64) -> i32 {
-    if PLAIN_MAGNITUDES.contains(&magnitude) {
-        0
-    } else {
-        magnitude.log10().floor() as i32
-    }
+    if PLAIN_MAGNITUDES.contains(&magnitude) { 0 } else { magnitude.log10().floor() as i32 }
 }
 
 /// A tick's label with as many decimals as its step needs, "−" for minus and "+" where `signed`.
@@ -63,19 +48,13 @@ fn label(value: f64, step: f64, exponent: i32, signed: bool) -> String {
     }
     let scale = 10_f64.powi(exponent);
     let (mantissa, step) = (value.abs() / scale, step / scale);
-    let decimals = (0..12)
-        .find(|&d| is_whole(step * 10_f64.powi(d)))
-        .unwrap_or(12);
+    let decimals = (0..12).find(|&d| is_whole(step * 10_f64.powi(d))).unwrap_or(12);
     let sign = match (value < 0.0, signed) {
         (true, _) => "−",
         (false, true) => "+",
         (false, false) => "",
     };
-    let power = if exponent == 0 {
-        String::new()
-    } else {
-        format!("×10{}", superscript(exponent))
-    };
+    let power = if exponent == 0 { String::new() } else { format!("×10{}", superscript(exponent)) };
     format!("{sign}{mantissa:.*}{power}", decimals as usize)
 }
 
@@ -101,62 +80,32 @@ mod tests {
     use super::*;
 
     fn labels(low: f64, high: f64, at_most: usize, signed: bool) -> Vec<String> {
-        ticks(low, high, at_most, signed)
-            .into_iter()
-            .map(|(_, label)| label)
-            .collect()
+        ticks(low, high, at_most, signed).into_iter().map(|(_, label)| label).collect()
     }
 
     #[test]
     fn ticks_are_round_and_reach_both_ends() {
-        assert_eq!(
-            labels(0.0, 1.0, 5, false),
-            ["0", "0.2", "0.4", "0.6", "0.8", "1.0"]
-        );
-        assert_eq!(
-            labels(-0.5, 0.5, 4, true),
-            ["−0.50", "−0.25", "0", "+0.25", "+0.50"]
-        );
+        assert_eq!(labels(0.0, 1.0, 5, false), ["0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
+        assert_eq!(labels(-0.5, 0.5, 4, true), ["−0.50", "−0.25", "0", "+0.25", "+0.50"]);
         assert_eq!(labels(0.0, 0.3, 3, false), ["0", "0.1", "0.2", "0.3"]);
-        assert_eq!(
-            labels(0.0, 2.0e-5, 4, false),
-            ["0", "0.5×10⁻⁵", "1.0×10⁻⁵", "1.5×10⁻⁵", "2.0×10⁻⁵"]
-        );
-        assert_eq!(
-            labels(0.0, 3.0e12, 3, false),
-            ["0", "1×10¹²", "2×10¹²", "3×10¹²"]
-        );
+        assert_eq!(labels(0.0, 2.0e-5, 4, false), ["0", "0.5×10⁻⁵", "1.0×10⁻⁵", "1.5×10⁻⁵", "2.0×10⁻⁵"]);
+        assert_eq!(labels(0.0, 3.0e12, 3, false), ["0", "1×10¹²", "2×10¹²", "3×10¹²"]);
         assert_eq!(labels(3.0, 47.0, 5, false), ["10", "20", "30", "40"]);
     }
 
     #[test]
     fn ticks_of_no_range_are_none() {
-        for (low, high) in [
-            (1.0, 1.0),
-            (2.0, 1.0),
-            (f64::NAN, 1.0),
-            (0.0, f64::INFINITY),
-        ] {
+        for (low, high) in [(1.0, 1.0), (2.0, 1.0), (f64::NAN, 1.0), (0.0, f64::INFINITY)] {
             assert!(ticks(low, high, 5, false).is_empty(), "{low} to {high}");
         }
     }
 
     #[test]
     fn numbers_are_rounded_up() {
-        for (value, rounded) in [
-            (0.0, 0.0),
-            (0.7, 0.8),
-            (0.2, 0.2),
-            (2.6e-7, 3.0e-7),
-            (1.01, 1.2),
-            (1000.0, 1000.0),
-            (9.0, 10.0),
-        ] {
-            assert!(
-                (round_up(value) - rounded).abs() <= 1.0e-12 * rounded,
-                "{value} gave {}",
-                round_up(value)
-            );
+        for (value, rounded) in
+            [(0.0, 0.0), (0.7, 0.8), (0.2, 0.2), (2.6e-7, 3.0e-7), (1.01, 1.2), (1000.0, 1000.0), (9.0, 10.0)]
+        {
+            assert!((round_up(value) - rounded).abs() <= 1.0e-12 * rounded, "{value} gave {}", round_up(value));
         }
     }
 }

@@ -75,7 +75,15 @@ pub fn see(world: &World, camera: &Camera, width: u32, height: u32, seed: u64) -
             let normal = world.bent_normal(&surface);
             let (irradiance_direct, _) = world.punctual_irradiance(&surface, normal, random.bits());
             let depth = hit.t;
-            points.push(ImagePoint { pixel: index, weight, surface, normal, view: -direction, depth, irradiance_direct });
+            points.push(ImagePoint {
+                pixel: index,
+                weight,
+                surface,
+                normal,
+                view: -direction,
+                depth,
+                irradiance_direct,
+            });
         }
         (points, sky)
     };

@@ -17,13 +17,7 @@ const INSIDE_COLOR: [u8; 3] = [214, 48, 49];
 const UNSAMPLED_COLOR: [u8; 3] = [9, 132, 227];
 
 /// Draws the probes over a picture of the scene. Probes hidden behind surfaces stay hidden.
-pub fn draw(
-    scene_picture: &Picture8,
-    view: &View,
-    camera: &Camera,
-    volume: &Volume,
-    exposure_ev: f32,
-) -> Picture8 {
+pub fn draw(scene_picture: &Picture8, view: &View, camera: &Camera, volume: &Volume, exposure_ev: f32) -> Picture8 {
     let (width, height) = (view.width, view.height);
     let mut picture = scene_picture.clone();
     let mut depth = vec![f32::INFINITY; width as usize * height as usize];
@@ -71,13 +65,7 @@ fn color(volume: &Volume, probe: usize, normal: Vec3, view: Vec3, exposure_ev: f
 }
 
 /// Pixels that a sphere may cover; `None` behind the camera.
-fn screen_box(
-    camera: &Camera,
-    centre: Vec3,
-    radius: f32,
-    width: u32,
-    height: u32,
-) -> Option<((u32, u32), (u32, u32))> {
+fn screen_box(camera: &Camera, centre: Vec3, radius: f32, width: u32, height: u32) -> Option<((u32, u32), (u32, u32))> {
     let in_camera = camera.world_from_camera.transpose() * (centre - camera.position);
     let scale = match camera.projection {
         Projection::Perspective { fov_y_rad } => {

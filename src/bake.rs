@@ -52,6 +52,8 @@ pub struct Prepared<'w, 's> {
     pub plan: Plan,
     pub survey_rays: u64,
     pub survey_s: f64,
+    /// Hull of the probes relative to the scene's origin, a little enlarged.
+    hull: (glam::Vec3, glam::Vec3),
 }
 
 /// A finished bake.
@@ -97,7 +99,8 @@ pub fn prepare<'w, 's>(
     bar.finish_and_clear();
     let plan = Plan::new(world, config, &grid, &placement, surface.as_ref());
     let survey_s = started.elapsed().as_secs_f64();
-    Ok(Prepared { world, config, grid, placement, surface, plan, survey_rays, survey_s })
+    let hull = grid.hull(HULL_TOLERANCE);
+    Ok(Prepared { world, config, grid, placement, surface, plan, survey_rays, survey_s, hull })
 }
 
 /// Positions of all probes relative to the scene's origin.
@@ -125,7 +128,9 @@ impl Prepared<'_, '_> {
         Capture {
             world: self.world,
             settings: &self.config.capture,
-            distance_clamp_m: self.config.filter.distance_clamp * self.grid.spacing.length(),
+            distance_clamp_m: self
+                .wants_distance()
+                .then(|| self.config.filter.distance_clamp * self.grid.spacing.length()),
             emitter_coverage: self.placement.emitter_coverage,
             seed: circumstances.seed,
         }
@@ -139,7 +144,8 @@ impl Prepared<'_, '_> {
     /// Traces one active probe.
     fn trace(&self, capture: &Capture, probe: usize) -> ProbeCapture {
         let position = self.grid.origin + self.grid.position_in_grid(ProbeIndex(probe as u32));
-        capture.probe(probe, position, |p| self.grid.contains(p, HULL_TOLERANCE))
+        let (low, high) = self.hull;
+        capture.probe(probe, position, |p| p.cmpge(low).all() && p.cmple(high).all())
     }
 
     /// Rays per second of bare Embree over the rays of the capture, in its order.
@@ -248,12 +254,16 @@ impl Prepared<'_, '_> {
         Baked { volume, container, losses, solution, plan, rays, times, numerics, surface_bytes }
     }
 
-    /// The filter of the distance maps, where the method has them and the plan or the configuration keeps them.
+    /// Whether the method has distance maps and the plan or the configuration keeps them.
+    fn wants_distance(&self) -> bool {
+        matches!(self.config.query.visibility, VisibilitySettings::Moments { .. })
+            && (self.plan.visibility || self.config.plan == PlanMode::KeepEverything)
+    }
+
+    /// The filter of the distance maps, where there are any.
     fn distance_kernel(&self) -> Option<Kernel> {
         let config = self.config;
-        let wanted = matches!(config.query.visibility, VisibilitySettings::Moments { .. })
-            && (self.plan.visibility || config.plan == PlanMode::KeepEverything);
-        wanted.then(|| {
+        self.wants_distance().then(|| {
             Kernel::lobe(config.capture.resolution, config.filter.distance_resolution, config.filter.distance_exponent)
         })
     }

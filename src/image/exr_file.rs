@@ -22,8 +22,11 @@ const FORMAT: &str = "OpenEXR";
 /// The Huffman runs of PIZ (512 bytes in 10 bits) and the other methods stay below.
 const MAX_EXPANSION: u64 = 2 * 1032;
 
-/// DWA packs a flat 8 × 8 block of 16-bit samples into one symbol before it deflates.
-const MAX_EXPANSION_DWA: u64 = 128 * MAX_EXPANSION;
+/// DWA stores a flat block of 8 × 8 samples as one number before it deflates, which gains at most this much more.
+const MAX_EXPANSION_DWA: u64 = 64 * MAX_EXPANSION;
+
+/// A picture of this size is never refused for its file's: 4096 × 2048 black pixels in DWA are a thousand bytes.
+const HARMLESS_BYTES: u64 = 64 << 20;
 
 /// Bytes that every block takes at least: its entry in the table of offsets (8), its coordinate (4) and its length (4).
 const MIN_BLOCK_BYTES: u64 = 16;
@@ -78,7 +81,7 @@ impl<'a> ExrFile<'a> {
         let path = self.path;
         let meta = self.reader.meta_data().clone();
         let header = &meta.headers[part];
-        let mut decode_all = || {
+        let decode_all = || {
             let is_wanted = |block_part: usize, is_full_size: bool| block_part == part && is_full_size;
             let chunks = self
                 .reader
@@ -103,7 +106,7 @@ fn is_plausible(header: &Header, file_bytes: u64) -> bool {
     let bytes = pixels.saturating_mul(header.channels.bytes_per_pixel as u64);
     let expansion = if is_dwa(header) { MAX_EXPANSION_DWA } else { MAX_EXPANSION };
     pixels <= MAX_PIXELS
-        && bytes <= file_bytes.saturating_mul(expansion)
+        && bytes <= file_bytes.saturating_mul(expansion).max(HARMLESS_BYTES)
         && (header.chunk_count as u64).saturating_mul(MIN_BLOCK_BYTES) <= file_bytes
 }
 

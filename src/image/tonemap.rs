@@ -26,8 +26,8 @@ pub fn tonemap(pixel: Vec3, exposure_ev: f32) -> Vec3 {
 /// The filmic curve of K. Narkowicz, "ACES Filmic Tone Mapping Curve" (2015), as published (without the optional factor 0.6):
 /// [0,∞) to [0,1], monotone.
 fn tone_curve(x: f32) -> f32 {
-    // `max` returns the number when the other side is NaN.
-    let x = x.max(0.0).min(CURVE_SATURATED);
+    // NaN is not above 0.
+    let x = if x > 0.0 { x.min(CURVE_SATURATED) } else { 0.0 };
     (x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)).min(1.0)
 }
 

@@ -47,6 +47,8 @@ pub struct Emitters {
     entry_of_triangle: Vec<u32>,
     alias: Option<WeightedAliasIndex<f64>>,
     sky: Option<Sky>,
+    /// Box around all emissive triangles; empty (lower above upper) without any.
+    bounds: (Vec3, Vec3),
 }
 
 /// What sampling needs of a triangle, together in memory.
@@ -114,10 +116,12 @@ impl Emitters {
                 entry_of_triangle[t.index.0 as usize] = entry as u32 + 1;
             }
         }
+        let corners = || triangles.iter().flat_map(|t| [t.corner, t.corner + t.edges[0], t.corner + t.edges[1]]);
+        let bounds = (corners().fold(Vec3::INFINITY, Vec3::min), corners().fold(Vec3::NEG_INFINITY, Vec3::max));
         let weights = powers.into_iter().map(|p| p.1).collect();
         // Fails only without positive weights: then there is nothing to sample.
         let alias = WeightedAliasIndex::new(weights).ok();
-        Emitters { triangles, entry_of_triangle, alias, sky: Sky::new(&scene.environment) }
+        Emitters { triangles, entry_of_triangle, alias, sky: Sky::new(&scene.environment), bounds }
     }
 
     pub fn is_empty(&self) -> bool {
@@ -131,6 +135,13 @@ impl Emitters {
 
     pub fn has_sky(&self) -> bool {
         self.sky.is_some()
+    }
+
+    /// Whether every emitter lies behind the plane through `point` with this normal, so that sampling is in vain.
+    pub fn all_behind(&self, point: Vec3, normal: Vec3) -> bool {
+        let (low, high) = self.bounds;
+        let foremost = Vec3::select(normal.cmpge(Vec3::ZERO), high, low);
+        self.sky.is_none() && !((foremost - point).dot(normal) > 0.0)
     }
 
     fn sky_share(&self) -> f32 {
@@ -154,11 +165,12 @@ impl Emitters {
         let target = triangle.point(barycentric);
         let to_target = target - point;
         let distance_squared = to_target.length_squared();
-        let direction = to_target.try_normalize()?;
+        let direction = to_target * distance_squared.sqrt().recip();
         let cosine = -triangle.normal.dot(direction);
         if cosine <= 0.0 && !triangle.double_sided {
             return None;
         }
+        // Not finite where the point lies on the emitter or in its plane.
         let density = triangle.density_per_area * (1.0 - sky_share) * distance_squared / cosine.abs();
         if !density.is_finite() {
             return None;

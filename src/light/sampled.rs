@@ -56,6 +56,9 @@ impl World<'_> {
         rays: &mut RayCount,
     ) -> Vec3 {
         let origin = point.ray_origin();
+        if self.emitters.all_behind(origin, point.geometric_normal) {
+            return Vec3::ZERO;
+        }
         let (n_cosine, n_light) = (allocation.cosine as f32, allocation.light as f32);
         let mut sum = Vec3::ZERO;
         for i in 0..allocation.cosine {

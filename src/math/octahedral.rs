@@ -31,7 +31,7 @@ fn point_on_octahedron(oct: Vec2) -> Vec3 {
 
 /// Unit direction of `oct` ∈ [−1,1]²; inverse of [`oct_from_direction`].
 pub fn direction_from_oct(oct: Vec2) -> Vec3 {
-    point_on_octahedron(oct).normalize()
+    direction_and_density(oct).0
 }
 
 /// Solid angle per area of the square, dω/(du dv), in sr.
@@ -39,7 +39,14 @@ pub fn direction_from_oct(oct: Vec2) -> Vec3 {
 /// A face of the octahedron has the normal (1,1,1)/√3 and lies 1/√3 from the centre; a patch du·dv of the square is a
 /// patch √3·du·dv of the face, seen at distance |p| under the cosine 1/(√3·|p|): dω = du·dv/|p|³.
 pub fn solid_angle_density(oct: Vec2) -> f32 {
-    point_on_octahedron(oct).length().powi(-3)
+    direction_and_density(oct).1
+}
+
+/// [`direction_from_oct`] and [`solid_angle_density`] at once, for one square root.
+pub fn direction_and_density(oct: Vec2) -> (Vec3, f32) {
+    let p = point_on_octahedron(oct);
+    let inverse_length = p.length_recip();
+    (p * inverse_length, inverse_length * inverse_length * inverse_length)
 }
 
 /// Centre of texel `i` of `0..resolution`, along one axis of `oct`.

@@ -33,7 +33,8 @@ pub fn cosine_hemisphere(normal: Vec3, u: Vec2) -> Vec3 {
     let d = concentric_disc(u);
     let z = (1.0 - d.length_squared()).max(0.0).sqrt();
     let (tangent, bitangent) = normal.any_orthonormal_pair();
-    (tangent * d.x + bitangent * d.y + normal * z).normalize()
+    // Unit to rounding as it stands: an orthonormal frame, and coordinates whose squares sum to 1.
+    tangent * d.x + bitangent * d.y + normal * z
 }
 
 /// Density of [`cosine_hemisphere`], sr⁻¹.

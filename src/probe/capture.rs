@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::light::World;
 use crate::light::lambert::reflected_radiance;
 use crate::light::sampled::{Allocation, RayCount};
-use crate::math::octahedral::{direction_from_oct, solid_angle_density};
+use crate::math::octahedral::{direction_and_density, oct_from_direction, solid_angle_density};
 use crate::math::random::{Purpose, Random};
 use crate::math::statistics::Moments;
 use crate::trace::Ray;
@@ -76,7 +76,7 @@ pub struct ProbeCapture {
     pub emitted: Vec<Vec3>,
     /// Directions towards sampled emitters, each with radiance ÷ density, W·m⁻².
     pub emitter_samples: Vec<(Vec3, Vec3)>,
-    /// Per texel: distances, clamped, metres.
+    /// Per texel: distances, clamped, metres; empty where no one asks for them.
     pub distances: Vec<Moments>,
     pub rays: RayCount,
     /// Hits outside the hull of the probes.
@@ -89,8 +89,8 @@ pub struct ProbeCapture {
 pub struct Capture<'w, 's> {
     pub world: &'w World<'s>,
     pub settings: &'w CaptureSettings,
-    /// Distances beyond count as this, and so do misses, metres.
-    pub distance_clamp_m: f32,
+    /// Distances beyond count as this, and so do misses, metres; `None` where no one asks for distances.
+    pub distance_clamp_m: Option<f32>,
     /// Share of directions in which emitters are seen.
     pub emitter_coverage: f32,
     pub seed: u64,
@@ -124,13 +124,13 @@ impl Capture<'_, '_> {
         let probe_samples = self.probe_samples();
         let mut out = ProbeCapture {
             emitted: vec![Vec3::ZERO; self.texels()],
-            distances: vec![Moments::default(); self.texels()],
+            distances: vec![Moments::default(); if self.distance_clamp_m.is_some() { self.texels() } else { 0 }],
             surfels: Vec::with_capacity(self.texels() * samples),
             ..Default::default()
         };
         let strata = strata(samples);
+        let mut random = Random::new(self.seed, Purpose::Capture, index as u64, 0);
         for texel in 0..self.texels() {
-            let mut random = Random::new(self.seed, Purpose::Capture, index as u64, texel as u64);
             let corner = Vec2::new((texel % resolution) as f32, (texel / resolution) as f32);
             let mut weight_sum = 0.0;
             let first = out.surfels.len();
@@ -139,9 +139,8 @@ impl Capture<'_, '_> {
                 let jitter = Vec2::new(random.uniform(), random.uniform());
                 let inside = (stratum + jitter) / Vec2::new(strata.0 as f32, strata.1 as f32);
                 let oct = (corner + inside) / resolution as f32 * 2.0 - 1.0;
-                let weight = solid_angle_density(oct);
+                let (direction, weight) = direction_and_density(oct);
                 weight_sum += weight;
-                let direction = direction_from_oct(oct);
                 // Density of capture rays in this direction, sr⁻¹: their number per area of the square ÷ dω/dA.
                 let density = samples as f32 * (resolution * resolution) as f32 / (4.0 * weight);
                 self.ray(
@@ -161,7 +160,6 @@ impl Capture<'_, '_> {
             }
         }
         self.sample_emitters(index, position, probe_samples, samples, &mut out);
-        out.surfels.shrink_to_fit();
         out
     }
 
@@ -190,10 +188,14 @@ impl Capture<'_, '_> {
                 let share = gathered_share(world.emitters.density_of_sky(world.scene, direction));
                 out.emitted[texel] += radiance * (share * weight);
             }
-            out.distances[texel].add(f64::from(self.distance_clamp_m), f64::from(weight));
+            if let Some(clamp) = self.distance_clamp_m {
+                out.distances[texel].add(f64::from(clamp), f64::from(weight));
+            }
             return;
         };
-        out.distances[texel].add(f64::from(surface.hit.t.min(self.distance_clamp_m)), f64::from(weight));
+        if let Some(clamp) = self.distance_clamp_m {
+            out.distances[texel].add(f64::from(surface.hit.t.min(clamp)), f64::from(weight));
+        }
         if surface.emission != Vec3::ZERO {
             let light_density = world.emitters.density_of_hit(position, direction, &surface.hit);
             out.emitted[texel] += surface.emission * (gathered_share(light_density) * weight);
@@ -237,7 +239,7 @@ impl Capture<'_, '_> {
             }
             out.rays.shadow += 1;
             if world.reaches(position, &sample, random.bits()) {
-                let oct = crate::math::octahedral::oct_from_direction(sample.direction);
+                let oct = oct_from_direction(sample.direction);
                 let capture_density = per_texel as f32 * self.texels() as f32 / (4.0 * solid_angle_density(oct));
                 let density = capture_density + count as f32 * sample.density;
                 out.emitter_samples.push((sample.direction, sample.radiance / density));

@@ -170,11 +170,11 @@ impl Grid {
         (position - self.origin) / self.spacing
     }
 
-    /// Whether a point lies in the hull of the probes, within `tolerance` of a spacing.
-    pub fn contains(&self, position: Vec3, tolerance: f32) -> bool {
-        let g = self.grid_from_scene(position);
+    /// Corners of the probes' hull relative to the scene's origin, enlarged by `tolerance` spacings.
+    pub fn hull(&self, tolerance: f32) -> (Vec3, Vec3) {
+        let margin = self.spacing * tolerance;
         let last = (self.divisions - UVec3::ONE).as_vec3();
-        g.cmpge(Vec3::splat(-tolerance)).all() && g.cmple(last + tolerance).all()
+        (self.origin - margin, self.origin + last * self.spacing + margin)
     }
 
     /// The cell of a point; points outside use the nearest cell, at its face.

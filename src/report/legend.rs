@@ -31,6 +31,8 @@ const TICK_LENGTH: u32 = 4;
 const LABEL_BASELINE: u32 = 69;
 const LABEL_EM: f32 = 12.0;
 const LABEL_GAP: f32 = 14.0;
+/// Room that is kept between a label and the picture's edge.
+const LABEL_EDGE: f32 = 6.0;
 const SWATCH: u32 = 11;
 /// Most ticks that a bar gets, however wide: more are not read.
 const MAX_TICKS: usize = 9;
@@ -144,7 +146,9 @@ impl Legend<'_> {
             }
             // Centred on the number: a sign would else push it off its tick.
             let sign = label.chars().next().filter(|first| "+−".contains(*first)).map(String::from).unwrap_or_default();
-            let x = centre as f32 - 0.5 * text_width(&sign, em_px);
+            let half_width = 0.5 * text_width(&label, em_px);
+            let reach = half_width + LABEL_EDGE * zoom as f32;
+            let x = (centre as f32 - 0.5 * text_width(&sign, em_px)).min(picture.width as f32 - reach).max(reach);
             draw_text(picture, &label, TextStyle { em_px, color: INK }, x, baseline, Anchor::Centre);
         }
     }

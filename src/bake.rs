@@ -20,7 +20,7 @@ use crate::probe::placement::{Placement, ProbeState, place};
 use crate::probe::query::VisibilitySettings;
 use crate::probe::solver::{Captures, Solution, Solver};
 use crate::probe::surface_visibility::SurfaceVisibility;
-use crate::probe::{Grid, ProbeIndex, Volume};
+use crate::probe::{Grid, Volume};
 use crate::progress::Progress;
 use crate::report::bake::{Numerics, Rays, Times};
 
@@ -87,12 +87,18 @@ pub fn prepare<'w, 's>(
         VisibilitySettings::Surface { voxels_per_cell } => Some(voxels_per_cell),
     };
     bar.set_prefix("surveying");
-    let positions = positions(&grid);
     let mut survey_rays = placement.rays;
     let surface = voxels.map(|voxels| {
         let seed = circumstances.seed;
-        let (table, rays) =
-            SurfaceVisibility::measure(world.scene, &world.tracer, &grid, &placement.states, &positions, voxels, seed);
+        let (table, rays) = SurfaceVisibility::measure(
+            world.scene,
+            &world.tracer,
+            &grid,
+            &placement.states,
+            &placement.positions,
+            voxels,
+            seed,
+        );
         survey_rays += rays;
         table
     });
@@ -101,11 +107,6 @@ pub fn prepare<'w, 's>(
     let survey_s = started.elapsed().as_secs_f64();
     let hull = grid.hull(HULL_TOLERANCE);
     Ok(Prepared { world, config, grid, placement, surface, plan, survey_rays, survey_s, hull })
-}
-
-/// Positions of all probes relative to the scene's origin.
-fn positions(grid: &Grid) -> Vec<glam::Vec3> {
-    (0..grid.probe_count() as u32).map(|p| grid.origin + grid.position_in_grid(ProbeIndex(p))).collect()
 }
 
 /// Captures in memory as far as the budget goes; the others are traced again whenever they are asked for.
@@ -143,7 +144,7 @@ impl Prepared<'_, '_> {
 
     /// Traces one active probe.
     fn trace(&self, capture: &Capture, probe: usize) -> ProbeCapture {
-        let position = self.grid.origin + self.grid.position_in_grid(ProbeIndex(probe as u32));
+        let position = self.placement.positions[probe];
         let (low, high) = self.hull;
         capture.probe(probe, position, |p| p.cmpge(low).all() && p.cmple(high).all())
     }
@@ -208,7 +209,7 @@ impl Prepared<'_, '_> {
         let is_surface = matches!(config.query.visibility, VisibilitySettings::Surface { .. });
         let surface_bytes = self.surface.as_ref().filter(|_| is_surface).map_or(0, SurfaceVisibility::bytes);
         let mut volume = Volume {
-            positions: positions(&self.grid),
+            positions: self.placement.positions.clone(),
             states: self.placement.states.clone(),
             irradiance: OctahedralMaps::new(probes, filter.irradiance_resolution, encoding.border, glam::Vec3::ZERO),
             curve: encoding.curve,

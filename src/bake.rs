@@ -16,7 +16,8 @@ use crate::probe::file::{self, EncodingLosses, SceneRecord};
 use crate::probe::filter::Kernel;
 use crate::probe::grid::GridError;
 use crate::probe::map::{OctahedralMaps, fill_with_border};
-use crate::probe::placement::{Placement, ProbeState, place};
+use crate::probe::need;
+use crate::probe::placement::{Placement, ProbeState, Settler, place};
 use crate::probe::query::VisibilitySettings;
 use crate::probe::solver::{Captures, Solution, Solver};
 use crate::probe::surface_visibility::SurfaceVisibility;
@@ -80,33 +81,57 @@ pub fn prepare<'w, 's>(
     let mut placement_settings = config.placement.clone();
     placement_settings.keep_unsampled |= config.plan == PlanMode::KeepEverything;
     let bar = circumstances.progress.stage("placing", 1);
-    let placement = place(world, &grid, &placement_settings, config.query.reach());
+    let mut placement = place(world, &grid, &placement_settings, config.query.reach());
+    bar.set_prefix("surveying");
+    let mut survey_rays = placement.rays;
     let voxels = match config.query.visibility {
         VisibilitySettings::None => None,
         VisibilitySettings::Moments { .. } => Some(SURVEY_VOXELS),
         VisibilitySettings::Surface { voxels_per_cell } => Some(voxels_per_cell),
     };
-    bar.set_prefix("surveying");
-    let mut survey_rays = placement.rays;
-    let surface = voxels.map(|voxels| {
-        let seed = circumstances.seed;
-        let (table, rays) = SurfaceVisibility::measure(
-            world.scene,
-            &world.tracer,
-            &grid,
-            &placement.states,
-            &placement.positions,
-            voxels,
-            seed,
-        );
-        survey_rays += rays;
-        table
-    });
+    let mut survey = |placement: &Placement| {
+        voxels.map(|voxels| {
+            let (states, positions) = (&placement.states, &placement.positions);
+            let seed = circumstances.seed;
+            let measured =
+                SurfaceVisibility::measure(world.scene, &world.tracer, &grid, states, positions, voxels, seed);
+            survey_rays += measured.rays;
+            measured
+        })
+    };
+    let mut surface = survey(&placement);
+    if let Some(measured) = &surface {
+        let settler = Settler { world, settings: &placement_settings, spacing_m: grid.spacing.min_element() };
+        if placement_settings.relocate && need::relocate(&settler, &grid, &mut placement, measured) > 0 {
+            surface = survey(&placement);
+        }
+    }
+    let mut surface = surface.map(|measured| measured.table);
+    if let (Some(table), VisibilitySettings::Surface { .. }) = (&mut surface, config.query.visibility) {
+        table.far = need::far_probes(&world.tracer, &grid, &placement, table);
+    }
+    // Only where shading asks this very table does a probe that no surface sees weigh nothing.
+    if let (Some(table), VisibilitySettings::Surface { .. }) = (&surface, config.query.visibility)
+        && !placement_settings.keep_unsampled
+    {
+        retire_unseen(&grid, &mut placement, table);
+    }
     bar.finish_and_clear();
     let plan = Plan::new(world, config, &grid, &placement, surface.as_ref());
     let survey_s = started.elapsed().as_secs_f64();
     let hull = grid.hull(HULL_TOLERANCE);
     Ok(Prepared { world, config, grid, placement, surface, plan, survey_rays, survey_s, hull })
+}
+
+/// Active probes that no surface sees are not worth baking.
+fn retire_unseen(grid: &Grid, placement: &mut Placement, table: &SurfaceVisibility) {
+    let mut seen = need::seen_probes(grid, placement, table, |_| true);
+    table.far.iter().for_each(|&(_, probe)| seen[probe as usize] = true);
+    for (state, seen) in placement.states.iter_mut().zip(seen) {
+        if *state == ProbeState::Active && !seen {
+            *state = ProbeState::NeverSampled;
+        }
+    }
 }
 
 /// Captures in memory as far as the budget goes; the others are traced again whenever they are asked for.

@@ -108,7 +108,7 @@ const MAX_MOVES: usize = 4;
 
 /// What the rays around a position meet.
 #[derive(Debug, Clone, Copy)]
-struct Surroundings {
+pub struct Surroundings {
     rays: u64,
     backs: u64,
     emitting: u64,
@@ -136,14 +136,16 @@ impl Default for Surroundings {
 }
 
 /// Classifies a probe and, where that helps, moves it.
-struct Settler<'a, 's> {
-    world: &'a World<'s>,
-    settings: &'a PlacementSettings,
-    spacing_m: f32,
+pub struct Settler<'a, 's> {
+    pub world: &'a World<'s>,
+    pub settings: &'a PlacementSettings,
+    /// Smallest spacing of the grid, metres.
+    pub spacing_m: f32,
 }
 
 impl Settler<'_, '_> {
-    fn look(&self, position: Vec3) -> Surroundings {
+    /// What the rays around a position meet.
+    pub fn look(&self, position: Vec3) -> Surroundings {
         let count = self.settings.rays as usize;
         let mut found = Surroundings { rays: count as u64, ..Default::default() };
         for i in 0..count {
@@ -166,7 +168,8 @@ impl Settler<'_, '_> {
         found
     }
 
-    fn is_inside(&self, around: &Surroundings) -> bool {
+    /// Whether so many of them are backs that the position lies inside something.
+    pub fn is_inside(&self, around: &Surroundings) -> bool {
         around.backs as f32 > self.settings.back_face_share * around.rays as f32
     }
 
@@ -216,7 +219,7 @@ impl Settler<'_, '_> {
 /// Probes at a corner of any cell that a triangle comes within `reach` spacings of.
 fn sampled_probes(grid: &Grid, mesh: &Mesh, reach: f32) -> Vec<bool> {
     let cells = grid.cells();
-    let mut occupied = vec![false; cells.to_array().iter().map(|&n| n as usize).product()];
+    let mut occupied = vec![false; grid.cell_count()];
     let half = Vec3::splat(0.5 + reach);
     for triangle in (0..mesh.triangles.len() as u32).map(TriangleIndex) {
         // In grid coordinates cells are unit boxes.

@@ -21,7 +21,7 @@ const CANDIDATES: u32 = 5;
 const ENCLOSED_SHARE: f32 = 0.9;
 
 /// Views from outside stand this many radii of the scene's bounding sphere from its centre, so that it fits the picture.
-const OUTSIDE_RADII: f32 = 2.2;
+const OUTSIDE_RADII: f32 = 2.0;
 
 /// Frames a scene: from its most open place, looking along its longest view, when it is enclosed; else from outside.
 pub fn frame(world: &World, bounds: (Vec3, Vec3)) -> (Camera, bool) {

@@ -16,6 +16,9 @@ use crate::trace::{Ray, Tracer};
 /// How far from a surface in need a probe is put, in spacings; half the free space where that is less.
 const DISTANCE: f32 = 0.2;
 
+/// Layers of probes around a cell that are searched for surfaces which see none of its eight.
+const FAR_RINGS: u32 = 3;
+
 /// Places tried for one probe, nearest first.
 const MAX_TRIES: usize = 12;
 
@@ -98,30 +101,43 @@ pub fn far_probes(tracer: &Tracer, grid: &Grid, placement: &Placement, table: &S
             return Vec::new();
         }
         let base = grid.cell_base(cell);
-        let own: Vec<ProbeIndex> = (0..8).map(|i| grid.corner(base, i)).collect();
-        let low = base.saturating_sub(UVec3::ONE);
-        let high = (base + UVec3::splat(2)).min(grid.divisions - UVec3::ONE);
-        let around = (low.z..=high.z)
-            .flat_map(|z| (low.y..=high.y).flat_map(move |y| (low.x..=high.x).map(move |x| UVec3::new(x, y, z))))
-            .map(|coordinate| grid.index(coordinate))
-            .filter(|probe| placement.states[probe.0 as usize] == ProbeState::Active && !own.contains(probe));
-        let around: Vec<ProbeIndex> = around.collect();
-        let position = |probe: &ProbeIndex| placement.positions[probe.0 as usize];
+        let rings: Vec<Vec<ProbeIndex>> =
+            (1..=FAR_RINGS).map(|ring| active_in_ring(grid, placement, base, ring)).collect();
         in_need
             .iter()
             .filter_map(|entry| {
-                let Need { point, normal } = need(grid, table, cell, entry);
-                let mut before: Vec<ProbeIndex> =
-                    around.iter().copied().filter(|p| (position(p) - point).dot(normal) > 0.0).collect();
-                let distance = |p: &ProbeIndex| position(p).distance_squared(point);
-                before.sort_by(|a, b| distance(a).total_cmp(&distance(b)).then(a.cmp(b)));
-                let seen = before.iter().find(|p| !tracer.occluded(Ray::segment(position(p), point, 0)))?;
+                let need = need(grid, table, cell, entry);
+                let seen = rings.iter().find_map(|ring| nearest_visible(tracer, placement, ring, &need))?;
                 Some((entry.index as u32, seen.0))
             })
             .collect()
     };
     // Cells come in order, and so do a cell's entries: the list is sorted.
     (0..grid.cell_count()).into_par_iter().flat_map_iter(of_cell).collect()
+}
+
+/// Active probes of the `ring`-th layer around the eight corners of a cell.
+fn active_in_ring(grid: &Grid, placement: &Placement, base: UVec3, ring: u32) -> Vec<ProbeIndex> {
+    let last = grid.divisions - UVec3::ONE;
+    let low = base.saturating_sub(UVec3::splat(ring));
+    let high = (base + UVec3::splat(1 + ring)).min(last);
+    let inner = |c: UVec3| (c + ring).cmpgt(base).all() && c.cmplt(base + UVec3::splat(1 + ring)).all();
+    (low.z..=high.z)
+        .flat_map(|z| (low.y..=high.y).flat_map(move |y| (low.x..=high.x).map(move |x| UVec3::new(x, y, z))))
+        .filter(|&coordinate| !inner(coordinate))
+        .map(|coordinate| grid.index(coordinate))
+        .filter(|probe| placement.states[probe.0 as usize] == ProbeState::Active)
+        .collect()
+}
+
+/// The nearest of some probes that a surface sees.
+fn nearest_visible(tracer: &Tracer, placement: &Placement, probes: &[ProbeIndex], need: &Need) -> Option<ProbeIndex> {
+    let position = |probe: ProbeIndex| placement.positions[probe.0 as usize];
+    let distance = |probe: ProbeIndex| position(probe).distance_squared(need.point);
+    let mut before: Vec<ProbeIndex> =
+        probes.iter().copied().filter(|&p| (position(p) - need.point).dot(need.normal) > 0.0).collect();
+    before.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
+    before.into_iter().find(|&p| !tracer.occluded(Ray::segment(position(p), need.point, 0)))
 }
 
 /// A place from which the surface can be seen; `None` where its surroundings are the inside of something.

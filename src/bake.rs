@@ -16,11 +16,12 @@ use crate::probe::file::{self, EncodingLosses, SceneRecord};
 use crate::probe::filter::Kernel;
 use crate::probe::grid::GridError;
 use crate::probe::map::{OctahedralMaps, fill_with_border};
-use crate::probe::placement::{Placement, ProbeState, place};
+use crate::probe::need;
+use crate::probe::placement::{Placement, ProbeState, Settler, place};
 use crate::probe::query::VisibilitySettings;
 use crate::probe::solver::{Captures, Solution, Solver};
 use crate::probe::surface_visibility::SurfaceVisibility;
-use crate::probe::{Grid, ProbeIndex, Volume};
+use crate::probe::{Grid, Volume};
 use crate::progress::Progress;
 use crate::report::bake::{Numerics, Rays, Times};
 
@@ -80,22 +81,41 @@ pub fn prepare<'w, 's>(
     let mut placement_settings = config.placement.clone();
     placement_settings.keep_unsampled |= config.plan == PlanMode::KeepEverything;
     let bar = circumstances.progress.stage("placing", 1);
-    let placement = place(world, &grid, &placement_settings, config.query.reach());
+    let mut placement = place(world, &grid, &placement_settings, config.query.reach());
+    bar.set_prefix("surveying");
+    let mut survey_rays = placement.rays;
     let voxels = match config.query.visibility {
         VisibilitySettings::None => None,
         VisibilitySettings::Moments { .. } => Some(SURVEY_VOXELS),
         VisibilitySettings::Surface { voxels_per_cell } => Some(voxels_per_cell),
     };
-    bar.set_prefix("surveying");
-    let positions = positions(&grid);
-    let mut survey_rays = placement.rays;
-    let surface = voxels.map(|voxels| {
-        let seed = circumstances.seed;
-        let (table, rays) =
-            SurfaceVisibility::measure(world.scene, &world.tracer, &grid, &placement.states, &positions, voxels, seed);
-        survey_rays += rays;
-        table
-    });
+    let mut survey = |placement: &Placement| {
+        voxels.map(|voxels| {
+            let (states, positions) = (&placement.states, &placement.positions);
+            let seed = circumstances.seed;
+            let measured =
+                SurfaceVisibility::measure(world.scene, &world.tracer, &grid, states, positions, voxels, seed);
+            survey_rays += measured.rays;
+            measured
+        })
+    };
+    let mut surface = survey(&placement);
+    if let Some(measured) = &surface {
+        let settler = Settler { world, settings: &placement_settings, spacing_m: grid.spacing.min_element() };
+        if placement_settings.relocate && need::relocate(&settler, &grid, &mut placement, measured) > 0 {
+            surface = survey(&placement);
+        }
+    }
+    let mut surface = surface.map(|measured| measured.table);
+    if let (Some(table), VisibilitySettings::Surface { .. }) = (&mut surface, config.query.visibility) {
+        table.far = need::far_probes(&world.tracer, &grid, &placement, table);
+    }
+    // Only where shading asks this very table does a probe that no surface sees weigh nothing.
+    if let (Some(table), VisibilitySettings::Surface { .. }) = (&surface, config.query.visibility)
+        && !placement_settings.keep_unsampled
+    {
+        retire_unseen(&grid, &mut placement, table);
+    }
     bar.finish_and_clear();
     let plan = Plan::new(world, config, &grid, &placement, surface.as_ref());
     let survey_s = started.elapsed().as_secs_f64();
@@ -103,9 +123,15 @@ pub fn prepare<'w, 's>(
     Ok(Prepared { world, config, grid, placement, surface, plan, survey_rays, survey_s, hull })
 }
 
-/// Positions of all probes relative to the scene's origin.
-fn positions(grid: &Grid) -> Vec<glam::Vec3> {
-    (0..grid.probe_count() as u32).map(|p| grid.origin + grid.position_in_grid(ProbeIndex(p))).collect()
+/// Active probes that no surface sees are not worth baking.
+fn retire_unseen(grid: &Grid, placement: &mut Placement, table: &SurfaceVisibility) {
+    let mut seen = need::seen_probes(grid, placement, table, |_| true);
+    table.far.iter().for_each(|&(_, probe)| seen[probe as usize] = true);
+    for (state, seen) in placement.states.iter_mut().zip(seen) {
+        if *state == ProbeState::Active && !seen {
+            *state = ProbeState::NeverSampled;
+        }
+    }
 }
 
 /// Captures in memory as far as the budget goes; the others are traced again whenever they are asked for.
@@ -143,7 +169,7 @@ impl Prepared<'_, '_> {
 
     /// Traces one active probe.
     fn trace(&self, capture: &Capture, probe: usize) -> ProbeCapture {
-        let position = self.grid.origin + self.grid.position_in_grid(ProbeIndex(probe as u32));
+        let position = self.placement.positions[probe];
         let (low, high) = self.hull;
         capture.probe(probe, position, |p| p.cmpge(low).all() && p.cmple(high).all())
     }
@@ -208,7 +234,7 @@ impl Prepared<'_, '_> {
         let is_surface = matches!(config.query.visibility, VisibilitySettings::Surface { .. });
         let surface_bytes = self.surface.as_ref().filter(|_| is_surface).map_or(0, SurfaceVisibility::bytes);
         let mut volume = Volume {
-            positions: positions(&self.grid),
+            positions: self.placement.positions.clone(),
             states: self.placement.states.clone(),
             irradiance: OctahedralMaps::new(probes, filter.irradiance_resolution, encoding.border, glam::Vec3::ZERO),
             curve: encoding.curve,

@@ -151,6 +151,16 @@ impl Grid {
         base.x + n.x * (base.y + n.y * base.z)
     }
 
+    pub fn cell_count(&self) -> usize {
+        self.cells().to_array().iter().map(|&n| n as usize).product()
+    }
+
+    /// Lowest corner of a cell; inverse of [`Self::cell_index`].
+    pub fn cell_base(&self, cell: usize) -> UVec3 {
+        let (nx, ny) = (self.cells().x as usize, self.cells().y as usize);
+        UVec3::new((cell % nx) as u32, (cell / nx % ny) as u32, (cell / (nx * ny)) as u32)
+    }
+
     pub fn coordinate(&self, probe: ProbeIndex) -> UVec3 {
         let (nx, ny) = (self.divisions.x, self.divisions.y);
         UVec3::new(probe.0 % nx, probe.0 / nx % ny, probe.0 / (nx * ny))

@@ -11,6 +11,7 @@ pub mod filter;
 pub mod grid;
 pub mod layout;
 pub mod map;
+pub mod need;
 pub mod overlap;
 pub mod placement;
 pub mod query;

@@ -8,11 +8,13 @@
 //!
 //! Storage: `key = voxel·6 + facing` (u16, voxel = x + n·(y + n·z), facing = 2·axis + (1 where negative)), sorted
 //! within each cell, with the mask (u8, bit i = corner i) beside it; `cell_start[c]..cell_start[c + 1]` are cell c's.
+//! Where a surface sees none of its eight probes — under a table, behind a pillar — a pair of u32 names its entry and
+//! a probe farther away that it does see.
 
 use glam::{UVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::grid::Grid;
+use super::grid::{Grid, ProbeIndex};
 use super::overlap::triangle_meets_box;
 use super::placement::ProbeState;
 use crate::math::random::{Purpose, Random};
@@ -38,11 +40,44 @@ pub struct SurfaceVisibility {
     pub cell_start: Vec<u32>,
     pub keys: Vec<u16>,
     pub masks: Vec<u8>,
+    /// Entries that see none of their eight probes, each with a probe of the cells around that they do see; sorted.
+    pub far: Vec<(u32, u32)>,
+}
+
+/// What a point sees of its eight probes, bit i for corner i; of none, a farther one may stand in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Seen {
+    pub mask: u8,
+    pub far: Option<ProbeIndex>,
+}
+
+/// A table with what is known beside it while baking.
+#[derive(Debug, Clone)]
+pub struct Measured {
+    pub table: SurfaceVisibility,
+    /// Per entry: whether the front of a surface, or a surface that has no back, faces there.
+    pub fronts: Vec<bool>,
+    pub rays: u64,
+}
+
+/// One entry of the table, decoded.
+#[derive(Debug, Clone, Copy)]
+pub struct Entry {
+    pub voxel: UVec3,
+    /// Main direction that the surface faces, unit.
+    pub facing: Vec3,
+    /// Bit i: whether corner i is visible.
+    pub mask: u8,
+    /// Index in the table.
+    pub index: usize,
 }
 
 /// Voxels are taken larger by this share on every side when surfaces are sorted into them, so that a surface on the
 /// border of two is known in both, on whichever side of it rounding puts the point that asks.
 const VOXEL_MARGIN: f32 = 0.03;
+
+/// Points nearer to a voxel's border than this share of its side may use the voxel beyond.
+const STRIP: f32 = 0.25;
 
 /// What the points of one triangle in one voxel see.
 #[derive(Debug, Clone, Copy, Default)]
@@ -60,38 +95,92 @@ struct Tally {
 }
 
 impl SurfaceVisibility {
-    /// Which of the eight corners of its cell a surface point sees. All of them where nothing is known.
-    pub fn mask(&self, grid: &Grid, position: Vec3, geometric_normal: Vec3) -> u8 {
+    /// What a surface point sees. Everything where nothing is known.
+    pub fn look_up(&self, grid: &Grid, position: Vec3, geometric_normal: Vec3) -> Seen {
         let cell = grid.cell(position);
         let n = self.voxels_per_cell;
-        let voxel = voxel_of(cell.fraction, n);
-        let key = key(voxel, facing(geometric_normal), n);
+        let facing = facing(geometric_normal);
         let index = grid.cell_index(cell.base);
-        let range = self.cell_start[index] as usize..self.cell_start[index + 1] as usize;
-        let (keys, masks) = (&self.keys[range.clone()], &self.masks[range]);
-        match keys.binary_search(&key) {
-            Ok(found) => masks[found],
-            Err(_) => nearest_entry(keys, key, n).map_or(u8::MAX, |found| masks[found]),
+        let first = self.cell_start[index] as usize;
+        let keys = &self.keys[first..self.cell_start[index + 1] as usize];
+        let wanted = key(voxel_of(cell.fraction, n), facing, n);
+        let found = match keys.binary_search(&wanted) {
+            Ok(found) => Some(found),
+            Err(_) => nearest_entry(keys, wanted, n),
+        };
+        let Some(found) = found else { return Seen { mask: u8::MAX, far: None } };
+        let mask = self.masks[first + found];
+        if mask != 0 {
+            return Seen { mask, far: None };
         }
+        let beside = self.beside(keys, first, cell.fraction, facing);
+        Seen { mask: beside, far: if beside == 0 { self.far_probe(first + found) } else { None } }
+    }
+
+    /// Mask of the voxel across a border that the point is close to, 0 where there is none.
+    ///
+    /// Where walls meet, the survey may miss a strip much narrower than a voxel; it continues in the next one.
+    fn beside(&self, keys: &[u16], first: usize, fraction: Vec3, facing: u32) -> u8 {
+        let n = self.voxels_per_cell;
+        let voxel = voxel_of(fraction, n);
+        let inside = fraction * n as f32 - voxel.as_vec3();
+        // Along each axis: towards the nearer border, if near enough and within the cell.
+        let last = n - 1;
+        let step = |axis: usize| match inside[axis] {
+            x if x < STRIP && voxel[axis] > 0 => Some(voxel[axis] - 1),
+            x if x > 1.0 - STRIP && voxel[axis] < last => Some(voxel[axis] + 1),
+            _ => None,
+        };
+        let steps = [step(0), step(1), step(2)];
+        // One axis at a time first, then two, then all three.
+        [0b001, 0b010, 0b100, 0b011, 0b101, 0b110, 0b111u32]
+            .into_iter()
+            .filter_map(|axes| {
+                let mut neighbour = voxel;
+                for axis in (0..3).filter(|axis| axes >> axis & 1 == 1) {
+                    neighbour[axis] = steps[axis]?;
+                }
+                let found = keys.binary_search(&key(neighbour, facing, n)).ok()?;
+                Some(self.masks[first + found])
+            })
+            .find(|&mask| mask != 0)
+            .unwrap_or(0)
+    }
+
+    /// The probe beyond its own cell that stands in for an entry which sees none of its eight.
+    fn far_probe(&self, entry: usize) -> Option<ProbeIndex> {
+        let found = self.far.binary_search_by_key(&(entry as u32), |f| f.0).ok()?;
+        Some(ProbeIndex(self.far[found].1))
     }
 
     /// Whether no entry hides an active probe: then the table says nothing.
     pub fn all_visible(&self, grid: &Grid, states: &[ProbeState]) -> bool {
-        let cells = grid.cells();
-        let base = |c: usize| {
-            let (nx, ny) = (cells.x as usize, cells.y as usize);
-            UVec3::new((c % nx) as u32, (c / nx % ny) as u32, (c / (nx * ny)) as u32)
-        };
         (0..self.cell_start.len().saturating_sub(1)).all(|c| {
             let range = self.cell_start[c] as usize..self.cell_start[c + 1] as usize;
-            let active = active_corners(grid, states, base(c));
+            let active = active_corners(grid, states, grid.cell_base(c));
             self.masks[range].iter().all(|mask| mask & active == active)
+        })
+    }
+
+    /// What is known about one cell.
+    pub fn entries(&self, cell: usize) -> impl Iterator<Item = Entry> + '_ {
+        let n = self.voxels_per_cell;
+        let range = self.cell_start[cell] as usize..self.cell_start[cell + 1] as usize;
+        range.map(move |i| {
+            let (voxel, facing) = (u32::from(self.keys[i]) / 6, u32::from(self.keys[i]) % 6);
+            let sign = if facing.is_multiple_of(2) { 1.0 } else { -1.0 };
+            Entry {
+                voxel: UVec3::new(voxel % n, voxel / n % n, voxel / (n * n)),
+                facing: Vec3::AXES[facing as usize / 2] * sign,
+                mask: self.masks[i],
+                index: i,
+            }
         })
     }
 
     /// Bytes of its tensors.
     pub fn bytes(&self) -> u64 {
-        (self.cell_start.len() * 4 + self.keys.len() * 3) as u64
+        (self.cell_start.len() * 4 + self.keys.len() * 3 + self.far.len() * 8) as u64
     }
 
     /// Measures every surface within the grid's hull.
@@ -103,7 +192,7 @@ impl SurfaceVisibility {
         positions: &[Vec3],
         voxels_per_cell: u32,
         seed: u64,
-    ) -> (SurfaceVisibility, u64) {
+    ) -> Measured {
         let survey = Survey { scene, tracer, grid, states, positions, n: voxels_per_cell, seed };
         let mut entries: Vec<(u32, u16, Tally)> =
             (0..scene.mesh.triangles.len() as u32).into_par_iter().flat_map_iter(|t| survey.triangle(t)).collect();
@@ -111,7 +200,8 @@ impl SurfaceVisibility {
         entries.par_sort_unstable_by_key(|e| (e.0, e.1));
         let rays = entries.iter().map(|e| u64::from(e.2.rays)).sum();
         let mut table = SurfaceVisibility { voxels_per_cell, ..Default::default() };
-        let cells: usize = grid.cells().to_array().iter().map(|&n| n as usize).product();
+        let mut fronts = Vec::new();
+        let cells = grid.cell_count();
         let mut groups = entries.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).peekable();
         for cell in 0..cells as u32 {
             table.cell_start.push(table.keys.len() as u32);
@@ -123,10 +213,11 @@ impl SurfaceVisibility {
                 }
                 table.keys.push(group[0].1);
                 table.masks.push(mask);
+                fronts.push(group.iter().any(|e| e.2.outside));
             }
         }
         table.cell_start.push(table.keys.len() as u32);
-        (table, rays)
+        Measured { table, fronts, rays }
     }
 }
 

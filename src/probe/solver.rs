@@ -37,7 +37,7 @@ impl Default for SolverSettings {
 }
 
 /// One sweep.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Bounce {
     pub index: u32,
     /// Largest change of any irradiance texel ÷ largest irradiance texel.
@@ -46,13 +46,30 @@ pub struct Bounce {
     pub energy: f64,
 }
 
-#[derive(Debug, Clone, Default)]
+/// How far the iteration has come; at its end, the result's figures.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Solution {
     pub bounces: Vec<Bounce>,
     pub converged: bool,
     /// Ratio of the last two changes; `None` before there are two.
     pub spectral_radius_estimate: Option<f64>,
+    /// Largest change of any irradiance texel in the last sweep, W·m⁻²; `None` before there was a second sweep.
+    pub last_change: Option<f64>,
     pub non_finite: u64,
+}
+
+impl Solution {
+    /// Takes the largest change of a sweep into account.
+    fn judge(&mut self, change: f64, residual: f64, settings: &SolverSettings) {
+        if let Some(previous) = self.last_change.filter(|&p| p > 0.0) {
+            self.spectral_radius_estimate = Some(change / previous);
+        }
+        // What is still to come is a geometric series in the ratio of the changes.
+        let ratio = self.spectral_radius_estimate.unwrap_or(f64::from(settings.albedo_max));
+        let missing = if ratio < 1.0 { residual * ratio / (1.0 - ratio) } else { f64::INFINITY };
+        self.last_change = Some(change);
+        self.converged = change == 0.0 || missing <= f64::from(settings.tolerance);
+    }
 }
 
 /// Where the captures of all probes come from: memory, or traced again.
@@ -78,37 +95,33 @@ pub struct Solver<'a, C> {
 }
 
 impl<C: Captures> Solver<'_, C> {
-    /// Fills the volume's irradiance. Its positions, states and visibility must stand already.
-    pub fn solve(&self, volume: &mut Volume, on_bounce: impl Fn(&Bounce)) -> Solution {
+    /// Fills the volume's irradiance. Its positions, states and visibility must stand already; after an interruption its
+    /// irradiance too, as it was when `progress` was reported.
+    pub fn solve(
+        &self,
+        volume: &mut Volume,
+        mut progress: Solution,
+        mut on_bounce: impl FnMut(&Solution, &Volume),
+    ) -> Solution {
         let settings = self.settings;
-        let mut solution = Solution::default();
-        let mut previous_change = None;
-        for index in 0..=settings.max_bounces {
-            let (irradiance, non_finite) = self.sweep(volume, index);
-            solution.non_finite += non_finite;
-            let bounce = measure(volume, &irradiance, index);
-            store(volume, &irradiance);
-            on_bounce(&bounce.0);
-            solution.bounces.push(bounce.0);
-            let change = bounce.1;
-            if index > 0 {
-                if let Some(previous) = previous_change.filter(|&p| p > 0.0) {
-                    solution.spectral_radius_estimate = Some(change / previous);
-                }
-                // What is still to come is a geometric series in the ratio of the changes.
-                let ratio = solution.spectral_radius_estimate.unwrap_or(f64::from(settings.albedo_max));
-                let missing = if ratio < 1.0 { bounce.0.residual * ratio / (1.0 - ratio) } else { f64::INFINITY };
-                previous_change = Some(change);
-                if change == 0.0 || missing <= f64::from(settings.tolerance) {
-                    solution.converged = true;
-                    break;
-                }
+        for index in progress.bounces.len() as u32..=settings.max_bounces {
+            if progress.converged {
+                break;
             }
+            let (irradiance, non_finite) = self.sweep(volume, index);
+            progress.non_finite += non_finite;
+            let (bounce, change) = measure(volume, &irradiance, index);
+            store(volume, &irradiance);
+            progress.bounces.push(bounce);
+            if index > 0 {
+                progress.judge(change, bounce.residual, settings);
+            }
+            on_bounce(&progress, volume);
         }
         if !self.gathers_emission {
             self.add_emission(volume);
         }
-        solution
+        progress
     }
 
     /// Irradiance of every probe (interior texels) from the outgoing radiance that the present irradiance gives.

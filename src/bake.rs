@@ -250,7 +250,7 @@ impl Prepared<'_, '_> {
         let mut volume = Volume {
             positions: self.placement.positions.clone(),
             states: self.placement.states.clone(),
-            irradiance: OctahedralMaps::new(probes, filter.irradiance_resolution, encoding.border, glam::Vec3::ZERO),
+            irradiance: OctahedralMaps::new(probes, filter.irradiance_resolution, encoding.border, glam::Vec3A::ZERO),
             curve: encoding.curve,
             distance: distance.clone().filter(|_| self.plan.visibility),
             surface_visibility: self.surface.clone().filter(|_| is_surface && self.plan.visibility),

@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use glam::Vec3;
+use glam::Vec3A;
 use safetensors::Dtype;
 
 use super::container::{Container, FileError, Tensor};
@@ -50,7 +50,7 @@ pub fn read(path: &Path, identity: &str, volume: &mut Volume) -> Result<Solution
     let progress = progress.ok_or_else(|| damaged("its progress is unreadable"))?;
     let tensor = container.tensors.get("irradiance").ok_or_else(|| damaged("it holds no irradiance"))?;
     let numbers: Vec<f32> = tensor.bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
-    let texels: Vec<Vec3> = numbers.as_chunks::<3>().0.iter().map(|t| Vec3::from(*t)).collect();
+    let texels: Vec<Vec3A> = numbers.as_chunks::<3>().0.iter().map(|t| Vec3A::from(*t)).collect();
     if tensor.dtype != Dtype::F32 || texels.len() != volume.irradiance.texels.len() {
         return Err(damaged("its irradiance is not that of this grid"));
     }

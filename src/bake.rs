@@ -2,7 +2,8 @@
 //!
 //! `bake` runs it once; whatever compares configurations runs it many times on one [`World`].
 
-use std::time::Instant;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 use glam::Vec2;
 use rayon::prelude::*;
@@ -11,7 +12,8 @@ use crate::config::{Config, PlanMode};
 use crate::light::World;
 use crate::plan::Plan;
 use crate::probe::capture::{Capture, EmissionTransport, ProbeCapture};
-use crate::probe::container::Container;
+use crate::probe::checkpoint;
+use crate::probe::container::{Container, FileError};
 use crate::probe::file::{self, EncodingLosses, SceneRecord};
 use crate::probe::filter::Kernel;
 use crate::probe::grid::GridError;
@@ -35,13 +37,24 @@ const SURVEY_VOXELS: u32 = 4;
 const REPLAY_CHUNK: usize = 256;
 
 /// One bake's circumstances that are not part of the method.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Circumstances {
     pub seed: u64,
     /// Most bytes of captures kept in memory; the rest is traced again for every bounce, with the same result.
     pub memory_budget_bytes: Option<u64>,
     pub progress: Progress,
+    /// Where sweeps are saved while a long bake runs, and whether to go on from there.
+    pub checkpoint: Option<Checkpoint>,
 }
+
+#[derive(Debug, Clone)]
+pub struct Checkpoint {
+    pub path: PathBuf,
+    pub resume: bool,
+}
+
+/// Time between two checkpoints: short bakes write none.
+const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(10);
 
 /// Everything decided before tracing the captures.
 pub struct Prepared<'w, 's> {
@@ -211,7 +224,7 @@ impl Prepared<'_, '_> {
     }
 
     /// Runs the rest of the pipeline. `load` and `accel_build` times are the caller's to fill.
-    pub fn bake(mut self, circumstances: &Circumstances, scene: &SceneRecord) -> Baked {
+    pub fn bake(mut self, circumstances: &Circumstances, scene: &SceneRecord) -> Result<Baked, FileError> {
         let config = self.config;
         let (filter, encoding) = (&config.filter, &config.encoding);
         let probes = self.grid.probe_count();
@@ -219,6 +232,7 @@ impl Prepared<'_, '_> {
         let mut numerics = Numerics {
             probes_inside_geometry: count(&self.placement, ProbeState::InsideGeometry),
             dropped_triangles: self.world.scene.dropped.total(),
+            albedo_clamped: self.world.clamped_materials(),
             ..Default::default()
         };
         let mut rays = Rays { survey: self.survey_rays, ..Default::default() };
@@ -236,7 +250,7 @@ impl Prepared<'_, '_> {
         let mut volume = Volume {
             positions: self.placement.positions.clone(),
             states: self.placement.states.clone(),
-            irradiance: OctahedralMaps::new(probes, filter.irradiance_resolution, encoding.border, glam::Vec3::ZERO),
+            irradiance: OctahedralMaps::new(probes, filter.irradiance_resolution, encoding.border, glam::Vec3A::ZERO),
             curve: encoding.curve,
             distance: distance.clone().filter(|_| self.plan.visibility),
             surface_visibility: self.surface.clone().filter(|_| is_surface && self.plan.visibility),
@@ -254,11 +268,29 @@ impl Prepared<'_, '_> {
             settings: &config.solver,
             gathers_emission: config.capture.emission == EmissionTransport::Gathered,
         };
-        let solution = solver.solve(&mut volume, |bounce| {
-            bar.inc(1);
-            bar.set_message(format!("residual {:.1e}", bounce.residual));
+        let identity = format!("{} seed {} {}", scene.blake3, circumstances.seed, config.to_ron());
+        let mut progress = Solution::default();
+        if let Some(Checkpoint { path, resume: true }) = &circumstances.checkpoint
+            && path.exists()
+        {
+            progress = checkpoint::read(path, &identity, &mut volume)?;
+        }
+        let mut saved = Ok(());
+        let mut last_saved = Instant::now();
+        let solution = solver.solve(&mut volume, progress, |progress, volume| {
+            bar.set_position(progress.bounces.len() as u64);
+            let residual = progress.bounces.last().map_or(0.0, |b| b.residual);
+            bar.set_message(format!("residual {residual:.1e}"));
+            if let Some(Checkpoint { path, .. }) = &circumstances.checkpoint
+                && last_saved.elapsed() > CHECKPOINT_INTERVAL
+                && saved.is_ok()
+            {
+                saved = checkpoint::write(path, &identity, progress, volume);
+                last_saved = Instant::now();
+            }
         });
         bar.finish_and_clear();
+        saved?;
         times.bounces = started.elapsed().as_secs_f64();
         numerics.non_finite += solution.non_finite;
         let done = solution.bounces.len().saturating_sub(1) as u32;
@@ -277,7 +309,7 @@ impl Prepared<'_, '_> {
         times.encode = started.elapsed().as_secs_f64();
         numerics.clamped = losses.clamped.clone();
         numerics.variance_floor_hits = losses.variance_floor_hits;
-        Baked { volume, container, losses, solution, plan, rays, times, numerics, surface_bytes }
+        Ok(Baked { volume, container, losses, solution, plan, rays, times, numerics, surface_bytes })
     }
 
     /// Whether the method has distance maps and the plan or the configuration keeps them.

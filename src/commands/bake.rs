@@ -6,17 +6,18 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 
 use super::{Console, load_scene, peak_memory_bytes, set_threads, write_json};
-use crate::bake::{Baked, Circumstances, Prepared, prepare};
+use crate::bake::{Baked, Checkpoint, Circumstances, Prepared, prepare};
 use crate::cli::BakeArgs;
 use crate::config::{Config, presets};
 use crate::light::World;
 use crate::plan::Line;
+use crate::probe::checkpoint;
 use crate::probe::file::SceneRecord;
 use crate::probe::layout;
 use crate::report::bake::{BakeReport, BytesPerProbe, SCHEMA};
 use crate::report::format;
 use crate::report::table::{Column, Table};
-use crate::scene::Scene;
+use crate::scene::{EnvironmentSource, Scene};
 
 pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     if args.preset.as_deref() == Some("list") {
@@ -40,19 +41,33 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     let accel_build_s = accel_started.elapsed().as_secs_f64();
     warn_if_dark(&world, path, console);
 
-    let circumstances =
-        Circumstances { seed: args.trace.seed, memory_budget_bytes: args.memory_budget, progress: console.progress };
+    let circumstances = Circumstances {
+        seed: args.trace.seed,
+        memory_budget_bytes: args.memory_budget,
+        progress: console.progress,
+        checkpoint: args
+            .output
+            .as_ref()
+            .map(|output| Checkpoint { path: checkpoint::path_for(output), resume: args.resume }),
+    };
+    if let Some(Checkpoint { path, resume: true }) = &circumstances.checkpoint
+        && !path.exists()
+    {
+        console.warn(format!("--resume: there is no {}; starting anew", path.display()));
+    }
     let prepared = prepare(&world, &config, &circumstances)?;
     if args.dry_run {
         return dry_run(&prepared, &circumstances, console);
     }
     let raw = args.measure_raw.then(|| prepared.raw_rays_per_s(&circumstances)).flatten();
     let record = SceneRecord { name: scene.name.clone(), blake3: scene.blake3.clone() };
-    let mut baked = prepared.bake(&circumstances, &record);
+    let mut baked = prepared.bake(&circumstances, &record)?;
 
     let Some(output) = &args.output else { return Ok(()) };
     let write_started = Instant::now();
     let file_bytes = baked.container.write(output)?;
+    // The result stands: what it could have been resumed from is of no more use.
+    let _ = std::fs::remove_file(checkpoint::path_for(output));
     baked.times.write = write_started.elapsed().as_secs_f64();
     baked.times.load = load_s;
     baked.times.accel_build = accel_build_s;
@@ -74,14 +89,21 @@ fn list_presets(console: &Console) -> Result<()> {
     console.print(&lines.join("\n"))
 }
 
-/// Defaults, then preset or file, then `--set`.
+/// Defaults, then preset or file, then `--set`, then a constant `--env`, which the probe file so carries to `render`.
 fn resolve_config(args: &BakeArgs) -> Result<Config> {
-    let config = match (&args.config, &args.preset) {
+    let mut config = match (&args.config, &args.preset) {
         (Some(path), _) => Config::load(path)?,
         (None, Some(name)) => presets::find(name)?,
         (None, None) => Config::default(),
     };
-    Ok(config.with_overrides(&args.set)?)
+    config = config.with_overrides(&args.set)?;
+    match &args.trace.env {
+        Some(EnvironmentSource::Constant(sky)) => config.lights.sky = Some((*sky).into()),
+        // A map replaces the configured sky; its path has no place in the file.
+        Some(EnvironmentSource::File(_)) => config.lights.sky = None,
+        None => {}
+    }
+    Ok(config)
 }
 
 fn warn_if_dark(world: &World, path: &Path, console: &Console) {
@@ -192,8 +214,8 @@ fn warn_about(report: &BakeReport, console: &Console) {
         console.warn(format!("{} values were not finite and count as zero", numerics.non_finite));
     }
     if numerics.albedo_clamped > 0 {
-        console.warn(format!(
-            "{} material(s) have an albedo above solver.albedo_max and are clamped to it",
+        console.say(format!(
+            "{} material(s) reach an albedo above solver.albedo_max and are clamped to it",
             numerics.albedo_clamped
         ));
     }

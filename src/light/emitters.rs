@@ -7,8 +7,8 @@
 use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
-use rand_distr::weighted::WeightedAliasIndex;
 
+use crate::math::alias::AliasTable;
 use crate::math::color::luminance;
 use crate::math::random::Random;
 use crate::math::sampling::{UNIFORM_SPHERE_DENSITY, triangle_barycentric, uniform_sphere};
@@ -45,7 +45,7 @@ pub struct Emitters {
     triangles: Vec<EmissiveTriangle>,
     /// Entry of `triangles` plus one of every scene triangle that emits, 0 for the others; empty if none emits.
     entry_of_triangle: Vec<u32>,
-    alias: Option<WeightedAliasIndex<f64>>,
+    alias: Option<AliasTable>,
     sky: Option<Sky>,
     /// Box around all emissive triangles; empty (lower above upper) without any.
     bounds: (Vec3, Vec3),
@@ -94,7 +94,7 @@ enum Sky {
     Uniform,
     /// Density of each texel, sr⁻¹.
     Map {
-        alias: WeightedAliasIndex<f64>,
+        alias: AliasTable,
         density: Vec<f32>,
     },
 }
@@ -118,9 +118,9 @@ impl Emitters {
         }
         let corners = || triangles.iter().flat_map(|t| [t.corner, t.corner + t.edges[0], t.corner + t.edges[1]]);
         let bounds = (corners().fold(Vec3::INFINITY, Vec3::min), corners().fold(Vec3::NEG_INFINITY, Vec3::max));
-        let weights = powers.into_iter().map(|p| p.1).collect();
-        // Fails only without positive weights: then there is nothing to sample.
-        let alias = WeightedAliasIndex::new(weights).ok();
+        let weights: Vec<f64> = powers.into_iter().map(|p| p.1).collect();
+        // `None` only without positive weights: then there is nothing to sample.
+        let alias = AliasTable::new(&weights);
         Emitters { triangles, entry_of_triangle, alias, sky: Sky::new(&scene.environment), bounds }
     }
 
@@ -153,14 +153,16 @@ impl Emitters {
     }
 
     /// A direction from `point` towards an emitter; `None` where the chosen one cannot light it.
+    #[inline]
     pub fn sample(&self, scene: &Scene, point: Vec3, random: &mut Random) -> Option<LightSample> {
         let sky_share = self.sky_share();
-        if random.uniform() < sky_share {
+        // No number is drawn where there is no choice.
+        if sky_share == 1.0 || (sky_share > 0.0 && random.uniform() < sky_share) {
             let (direction, density) = self.sky.as_ref()?.sample(&scene.environment, random);
             let radiance = scene.environment.radiance(direction);
             return Some(LightSample { direction, target: None, radiance, density: density * sky_share });
         }
-        let triangle = &self.triangles[random.pick(self.alias.as_ref()?)];
+        let triangle = &self.triangles[self.alias.as_ref()?.draw(random)];
         let barycentric = triangle_barycentric(Vec2::new(random.uniform(), random.uniform()));
         let target = triangle.point(barycentric);
         let to_target = target - point;
@@ -212,7 +214,7 @@ impl Sky {
                 let density = (0..map.texels.len())
                     .map(|i| (weights[i] / total) as f32 / texel_solid_angle(map, i / map.width))
                     .collect();
-                Some(Sky::Map { alias: WeightedAliasIndex::new(weights).ok()?, density })
+                Some(Sky::Map { alias: AliasTable::new(&weights)?, density })
             }
         }
     }
@@ -220,7 +222,7 @@ impl Sky {
     fn sample(&self, environment: &Environment, random: &mut Random) -> (Vec3, f32) {
         match (self, environment) {
             (Sky::Map { alias, density }, Environment::Map(map)) => {
-                let texel = random.pick(alias);
+                let texel = alias.draw(random);
                 let (x, y) = ((texel % map.width) as f32, (texel / map.width) as f32);
                 // Uniform in solid angle within the texel: uniform in the cosine of the polar angle.
                 let cos_of = |row: f32| (row / map.height as f32 * PI).cos();

@@ -43,6 +43,7 @@ impl SurfacePoint {
 /// What shading needs of a triangle, in one cache line: hits are scattered over the scene, and fetching their vertices
 /// one by one took as long as Embree took to find them.
 #[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
 struct TriangleRecord {
     corner: Vec3,
     edges: [Vec3; 2],
@@ -114,11 +115,13 @@ impl SurfaceTable {
 
 impl World<'_> {
     /// The surface that `ray` meets.
+    #[inline]
     pub fn surface(&self, ray: Ray) -> Option<SurfacePoint> {
         self.tracer.closest(ray).map(|hit| self.surface_at(hit, ray.direction))
     }
 
     /// The surface of a hit found along `direction`.
+    #[inline]
     pub fn surface_at(&self, hit: Hit, direction: Vec3) -> SurfacePoint {
         let record = &self.surfaces.triangles[hit.triangle.0 as usize];
         let front = record.normal.dot(direction) <= 0.0;
@@ -145,6 +148,7 @@ impl World<'_> {
     }
 
     /// Radiance that the front (or back) of a surface emits at a hit, W·m⁻²·sr⁻¹.
+    #[inline]
     fn emission_at(&self, hit: &Hit, front: bool) -> Vec3 {
         let record = &self.surfaces.triangles[hit.triangle.0 as usize];
         if !record.emits || !(front || record.double_sided) {
@@ -157,6 +161,7 @@ impl World<'_> {
     }
 
     /// Radiance that a hit emits against `direction`, W·m⁻²·sr⁻¹.
+    #[inline]
     pub fn emission_towards(&self, hit: &Hit, direction: Vec3) -> Vec3 {
         let record = &self.surfaces.triangles[hit.triangle.0 as usize];
         if !record.emits {

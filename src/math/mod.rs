@@ -1,5 +1,6 @@
 //! Numbers: maps between domains, sampling, statistics. Knows no scene and no probes.
 
+pub mod alias;
 pub mod color;
 pub mod fibonacci;
 pub mod octahedral;

@@ -1,7 +1,5 @@
 //! Random numbers that depend on what they are for, never on which thread draws them.
 
-use rand_distr::Distribution;
-use rand_distr::weighted::WeightedAliasIndex;
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::Rng;
 
@@ -30,15 +28,12 @@ impl Random {
     }
 
     /// Uniform in [0,1), a multiple of 2⁻²⁴.
+    #[inline]
     pub fn uniform(&mut self) -> f32 {
         (self.0.next_u32() >> 8) as f32 * (1.0 / (1u32 << 24) as f32)
     }
 
-    /// Index drawn by the table's weights.
-    pub fn pick(&mut self, table: &WeightedAliasIndex<f64>) -> usize {
-        table.sample(&mut self.0)
-    }
-
+    #[inline]
     pub fn bits(&mut self) -> u32 {
         self.0.next_u32()
     }

@@ -4,12 +4,14 @@
 //! [`Surfel`] — enough to compute its outgoing radiance again and again as bounces are added — and of every texel the
 //! emitted radiance and the distance. Traced once; a bounce costs queries only.
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec3A};
 use serde::{Deserialize, Serialize};
 
+use super::surface_visibility::Facing;
 use crate::light::World;
 use crate::light::lambert::reflected_radiance;
 use crate::light::sampled::{Allocation, RayCount};
+use crate::light::surface::SurfacePoint;
 use crate::math::octahedral::{direction_and_density, oct_from_direction, solid_angle_density};
 use crate::math::random::{Purpose, Random};
 use crate::math::statistics::Moments;
@@ -51,29 +53,72 @@ impl Default for CaptureSettings {
     }
 }
 
-/// A captured hit.
+/// A captured hit, in few bytes: a capture takes as long to be written to fresh memory as Embree takes for some of its
+/// rays, and every bounce reads it all.
+///
+/// Albedo and radiance are multiplied by the share of its texel's solid angle that the hit stands for, so that a texel's
+/// radiance is the sum over its surfels.
 #[derive(Debug, Clone, Copy)]
 pub struct Surfel {
     /// Relative to the scene's origin.
     pub position: Vec3,
-    /// Shading normal, unit, towards the probe.
-    pub normal: Vec3,
-    /// Unit, towards the probe.
-    pub geometric_normal: Vec3,
-    pub albedo: Vec3,
-    /// B⁰: radiance reflected from light that did not pass through probes, W·m⁻²·sr⁻¹.
+    /// B⁰: radiance reflected from light that did not pass through probes, times the share, W·m⁻²·sr⁻¹.
     pub direct_radiance: Vec3,
     pub texel: u32,
-    /// Share of its texel's solid angle.
-    pub weight: f32,
+    /// `oct` of the shading normal, towards the probe, in units of 1/[`NORMAL_SCALE`].
+    oct: [i16; 2],
+    /// Albedo times the share, in units of 1/[`ALBEDO_SCALE`].
+    albedo: [u16; 3],
+    /// Main direction of the geometric normal, towards the probe.
+    pub facing: Facing,
+}
+
+/// Steps of 1/32767 in `oct` are at most 10⁻⁴ rad: a thousandth of a texel of the maps that are asked.
+const NORMAL_SCALE: f32 = i16::MAX as f32;
+
+/// Steps of 1/65535 err by 10⁻⁵ of a typical albedo, upwards as often as downwards: a tenth of the solver's tolerance.
+const ALBEDO_SCALE: f32 = u16::MAX as f32;
+
+const _: () = assert!(size_of::<Surfel>() == 40);
+
+impl Surfel {
+    fn new(surface: &SurfacePoint, direct_radiance: Vec3, texel: u32, share: f32) -> Surfel {
+        // Adding a half before truncation rounds.
+        let oct = oct_from_direction(surface.shading_normal) * NORMAL_SCALE;
+        let albedo = surface.albedo * (share * ALBEDO_SCALE) + 0.5;
+        Surfel {
+            position: surface.position,
+            direct_radiance: direct_radiance * share,
+            texel,
+            oct: [oct.x, oct.y].map(|x| (x + 0.5f32.copysign(x)) as i16),
+            albedo: [albedo.x as u16, albedo.y as u16, albedo.z as u16],
+            facing: Facing::of(surface.geometric_normal),
+        }
+    }
+
+    /// `oct` of the shading normal.
+    #[inline]
+    pub fn oct(&self) -> Vec2 {
+        Vec2::new(f32::from(self.oct[0]), f32::from(self.oct[1])) * (1.0 / NORMAL_SCALE)
+    }
+
+    /// Albedo times the share.
+    #[inline]
+    pub fn albedo(&self) -> Vec3 {
+        let [r, g, b] = self.albedo.map(f32::from);
+        Vec3::new(r, g, b) * (1.0 / ALBEDO_SCALE)
+    }
 }
 
 /// One probe's G-buffer.
 #[derive(Debug, Clone, Default)]
 pub struct ProbeCapture {
+    /// Number of texels.
+    pub texels: usize,
     pub surfels: Vec<Surfel>,
-    /// Per texel: radiance emitted by surfaces and the sky, weighted against `emitter_samples`, W·m⁻²·sr⁻¹.
-    pub emitted: Vec<Vec3>,
+    /// Texels in which surfaces or the sky emit, with the radiance, weighted against `emitter_samples`, W·m⁻²·sr⁻¹; a
+    /// texel may come more than once.
+    pub emitted: Vec<(u32, Vec3)>,
     /// Directions towards sampled emitters, each with radiance ÷ density, W·m⁻².
     pub emitter_samples: Vec<(Vec3, Vec3)>,
     /// Per texel: distances, clamped, metres; empty where no one asks for them.
@@ -120,95 +165,79 @@ impl Capture<'_, '_> {
 
     /// Captures the probe at `position`. Depends on nothing but the arguments and `self`.
     pub fn probe(&self, index: usize, position: Vec3, contains: impl Fn(Vec3) -> bool) -> ProbeCapture {
-        let (resolution, samples) = (self.settings.resolution, self.settings.samples_per_texel.max(1));
-        let probe_samples = self.probe_samples();
+        let samples = self.settings.samples_per_texel.max(1);
+        let emitter_samples = EmitterSamples { surface: self.surface_allocation(), probe: self.probe_samples() };
         let mut out = ProbeCapture {
-            emitted: vec![Vec3::ZERO; self.texels()],
+            texels: self.texels(),
             distances: vec![Moments::default(); if self.distance_clamp_m.is_some() { self.texels() } else { 0 }],
             surfels: Vec::with_capacity(self.texels() * samples),
             ..Default::default()
         };
-        let strata = strata(samples);
+        let strata = Strata::new(samples, self.settings.resolution);
         let mut random = Random::new(self.seed, Purpose::Capture, index as u64, 0);
+        let mut rays = Vec::with_capacity(samples);
         for texel in 0..self.texels() {
-            let corner = Vec2::new((texel % resolution) as f32, (texel / resolution) as f32);
-            let mut weight_sum = 0.0;
-            let first = out.surfels.len();
-            for sample in 0..samples {
-                let stratum = Vec2::new((sample % strata.0) as f32, (sample / strata.0) as f32);
-                let jitter = Vec2::new(random.uniform(), random.uniform());
-                let inside = (stratum + jitter) / Vec2::new(strata.0 as f32, strata.1 as f32);
-                let oct = (corner + inside) / resolution as f32 * 2.0 - 1.0;
-                let (direction, weight) = direction_and_density(oct);
-                weight_sum += weight;
-                // Density of capture rays in this direction, sr⁻¹: their number per area of the square ÷ dω/dA.
-                let density = samples as f32 * (resolution * resolution) as f32 / (4.0 * weight);
-                self.ray(
-                    position,
-                    direction,
-                    density,
-                    probe_samples,
-                    (texel, weight),
-                    &mut random,
-                    &contains,
-                    &mut out,
-                );
-            }
-            out.emitted[texel] /= weight_sum;
-            for surfel in &mut out.surfels[first..] {
-                surfel.weight /= weight_sum;
+            rays.clear();
+            rays.extend((0..samples).map(|sample| direction_and_density(strata.oct(texel, sample, &mut random))));
+            let sum: f32 = rays.iter().map(|(_, solid_angle)| solid_angle).sum();
+            for &(direction, solid_angle) in &rays {
+                let ray = TexelRay { texel: texel as u32, direction, solid_angle, share: solid_angle / sum };
+                self.ray(position, &ray, &emitter_samples, &mut random, &contains, &mut out);
             }
         }
-        self.sample_emitters(index, position, probe_samples, samples, &mut out);
+        out.rays.primary += (self.texels() * samples) as u64;
+        self.sample_emitters(index, position, emitter_samples.probe, samples, &mut out);
+        out.surfels.shrink_to_fit();
         out
     }
 
     /// One capture ray.
-    #[allow(clippy::too_many_arguments)]
+    #[inline]
     fn ray(
         &self,
         position: Vec3,
-        direction: Vec3,
-        density: f32,
-        probe_samples: u32,
-        (texel, weight): (usize, f32),
+        ray: &TexelRay,
+        emitter_samples: &EmitterSamples,
         random: &mut Random,
         contains: impl Fn(Vec3) -> bool,
         out: &mut ProbeCapture,
     ) {
         let world = self.world;
-        out.rays.primary += 1;
-        let ray = Ray::new(position, direction, random.bits());
-        let n_light = probe_samples as f32;
+        let TexelRay { texel, direction, share, .. } = *ray;
         // Balance heuristic between this ray and the emitter samples drawn from the probe's centre.
-        let gathered_share = |light_density: f32| density / (density + n_light * light_density);
-        let Some(surface) = world.surface(ray) else {
+        let gathered_share = |light_density: f32| {
+            // Density of capture rays in this direction, sr⁻¹: their number per area of the square ÷ dω/dA.
+            let per_area = (self.settings.samples_per_texel.max(1) * self.texels()) as f32 / 4.0;
+            let density = per_area / ray.solid_angle;
+            density / (density + emitter_samples.probe as f32 * light_density)
+        };
+        let Some(surface) = world.surface(Ray::new(position, direction, random.bits())) else {
             let radiance = world.scene.environment.radiance(direction);
             if radiance != Vec3::ZERO {
-                let share = gathered_share(world.emitters.density_of_sky(world.scene, direction));
-                out.emitted[texel] += radiance * (share * weight);
+                let gathered = gathered_share(world.emitters.density_of_sky(world.scene, direction));
+                out.emitted.push((texel, radiance * (gathered * share)));
             }
             if let Some(clamp) = self.distance_clamp_m {
-                out.distances[texel].add(f64::from(clamp), f64::from(weight));
+                out.distances[texel as usize].add(f64::from(clamp), f64::from(share));
             }
             return;
         };
         if let Some(clamp) = self.distance_clamp_m {
-            out.distances[texel].add(f64::from(surface.hit.t.min(clamp)), f64::from(weight));
+            out.distances[texel as usize].add(f64::from(surface.hit.t.min(clamp)), f64::from(share));
         }
         if surface.emission != Vec3::ZERO {
-            let light_density = world.emitters.density_of_hit(position, direction, &surface.hit);
-            out.emitted[texel] += surface.emission * (gathered_share(light_density) * weight);
+            let gathered = gathered_share(world.emitters.density_of_hit(position, direction, &surface.hit));
+            out.emitted.push((texel, surface.emission * (gathered * share)));
         }
-        let normal = surface.shading_normal;
         out.hits_outside_volume += u64::from(!contains(surface.position));
         if surface.albedo == Vec3::ZERO {
             // Reflects nothing: no bounce will ever ask for it.
             return;
         }
+        let normal = surface.shading_normal;
         let (punctual, shadow_rays) = world.punctual_irradiance(&surface, normal, random.bits());
         out.rays.shadow += u64::from(shadow_rays);
-        let sampled = match self.surface_allocation() {
+        let sampled = match emitter_samples.surface {
             Some(allocation) => world.emitter_irradiance(&surface, normal, allocation, random, &mut out.rays),
             None => Vec3::ZERO,
         };
@@ -217,15 +246,7 @@ impl Capture<'_, '_> {
             out.non_finite += 1;
             direct = Vec3::ZERO;
         }
-        out.surfels.push(Surfel {
-            position: surface.position,
-            normal,
-            geometric_normal: surface.geometric_normal,
-            albedo: surface.albedo,
-            direct_radiance: direct,
-            texel: texel as u32,
-            weight,
-        });
+        out.surfels.push(Surfel::new(&surface, direct, texel, share));
     }
 
     /// Draws emitters from the probe's centre.
@@ -252,10 +273,17 @@ impl ProbeCapture {
     /// Memory that it takes.
     pub fn bytes(&self) -> u64 {
         (self.surfels.capacity() * size_of::<Surfel>()
-            + self.emitted.capacity() * size_of::<Vec3>()
+            + self.emitted.capacity() * size_of::<(u32, Vec3)>()
             + self.emitter_samples.capacity() * size_of::<(Vec3, Vec3)>()
             + self.distances.capacity() * size_of::<Moments>()
             + size_of::<ProbeCapture>()) as u64
+    }
+
+    /// Emitted radiance in every texel.
+    pub fn emitted_radiance(&self) -> Vec<Vec3A> {
+        let mut radiance = vec![Vec3A::ZERO; self.texels];
+        self.emitted.iter().for_each(|&(texel, emitted)| radiance[texel as usize] += Vec3A::from(emitted));
+        radiance
     }
 
     /// Irradiance around `normal` from the emitters sampled at the probe's centre, W·m⁻².
@@ -264,9 +292,48 @@ impl ProbeCapture {
     }
 }
 
-/// Columns and rows of strata for this many samples: as square as its divisors allow.
-fn strata(samples: usize) -> (usize, usize) {
-    let columns = (1..=samples).take_while(|c| c * c <= samples).filter(|c| samples.is_multiple_of(*c)).last();
-    let columns = columns.unwrap_or(1);
-    (columns, samples / columns)
+/// How often emitters are sampled, the same for all rays of a probe.
+struct EmitterSamples {
+    /// At every hit.
+    surface: Option<Allocation>,
+    /// From the probe's centre.
+    probe: u32,
+}
+
+/// One of the rays through a texel.
+struct TexelRay {
+    texel: u32,
+    /// Unit.
+    direction: Vec3,
+    /// Solid angle per area of the octahedral square there, sr.
+    solid_angle: f32,
+    /// Of its texel's solid angle, against the texel's other rays.
+    share: f32,
+}
+
+/// How the samples of a texel are laid out in it.
+struct Strata {
+    columns: usize,
+    /// Texels per side of the map.
+    resolution: usize,
+    /// Of one stratum in the octahedral square.
+    size: Vec2,
+}
+
+impl Strata {
+    /// As square as the divisors of `samples` allow.
+    fn new(samples: usize, resolution: usize) -> Strata {
+        let columns = (1..=samples).take_while(|c| c * c <= samples).filter(|c| samples.is_multiple_of(*c)).last();
+        let columns = columns.unwrap_or(1);
+        let size = 2.0 / (resolution as f32 * Vec2::new(columns as f32, (samples / columns) as f32));
+        Strata { columns, resolution, size }
+    }
+
+    /// Where a sample of a texel goes, jittered.
+    fn oct(&self, texel: usize, sample: usize, random: &mut Random) -> Vec2 {
+        let stratum = Vec2::new((sample % self.columns) as f32, (sample / self.columns) as f32);
+        let jitter = Vec2::new(random.uniform(), random.uniform());
+        let corner = Vec2::new((texel % self.resolution) as f32, (texel / self.resolution) as f32);
+        corner * (2.0 / self.resolution as f32) + (stratum + jitter) * self.size - 1.0
+    }
 }

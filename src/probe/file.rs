@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use glam::{DVec3, UVec3, Vec2, Vec3};
+use glam::{DVec3, UVec3, Vec2, Vec3, Vec3A};
 use safetensors::Dtype;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -104,7 +104,8 @@ pub fn encode(
     container.tensors.insert("state".into(), tensor(Dtype::U8, &[probes], states));
 
     let side = volume.irradiance.side();
-    let colors = encode_colors(&volume.irradiance.texels, encoding.irradiance);
+    let texels: Vec<Vec3> = volume.irradiance.texels.iter().map(|&t| t.into()).collect();
+    let colors = encode_colors(&texels, encoding.irradiance);
     let (dtype, mut shape) = match encoding.irradiance {
         ColorFormat::R11G11B10F => (Dtype::U32, vec![probes, side, side]),
         ColorFormat::F16 => (Dtype::F16, vec![probes, side, side]),
@@ -296,7 +297,7 @@ fn decode_irradiance(
     probes: usize,
     border: usize,
     scale: f32,
-) -> Result<(ColorFormat, OctahedralMaps<Vec3>), String> {
+) -> Result<(ColorFormat, OctahedralMaps<Vec3A>), String> {
     if !(scale > 0.0 && scale.is_finite()) {
         return Err(format!("metadata 'scale.irradiance' is {scale}"));
     }
@@ -312,6 +313,7 @@ fn decode_irradiance(
     if texels.iter().any(|t| !t.is_finite()) {
         return Err("tensor 'irradiance' holds numbers that are not finite".into());
     }
+    let texels = texels.into_iter().map(Vec3A::from).collect();
     Ok((format, OctahedralMaps { resolution: resolution("irradiance", tensor, border)?, border, texels }))
 }
 

@@ -188,15 +188,17 @@ impl Grid {
     }
 
     /// The cell of a point; points outside use the nearest cell, at its face.
+    #[inline]
     pub fn cell(&self, position: Vec3) -> Cell {
         let g = self.grid_from_scene(position);
-        // `as` saturates and sends NaN to 0: any point has a cell.
-        let base = g.floor().max(Vec3::ZERO).as_uvec3().min(self.cells() - UVec3::ONE);
+        // `as` truncates, saturates and sends NaN to 0: any point has a cell.
+        let base = g.max(Vec3::ZERO).as_uvec3().min(self.cells() - UVec3::ONE);
         let layered = (self.divisions.min(UVec3::splat(2)) - UVec3::ONE).as_vec3();
         Cell { base, fraction: (g - base.as_vec3()).clamp(Vec3::ZERO, Vec3::ONE) * layered }
     }
 
     /// Corner `i` of a cell: bit 0 is +x, bit 1 is +y, bit 2 is +z.
+    #[inline]
     pub fn corner(&self, base: UVec3, i: u32) -> ProbeIndex {
         let step = UVec3::new(i & 1, i >> 1 & 1, i >> 2 & 1);
         self.index((base + step).min(self.divisions - UVec3::ONE))

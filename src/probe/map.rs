@@ -50,13 +50,14 @@ impl<T: Copy> OctahedralMaps<T> {
     }
 
     /// Where to look for `oct` ∈ [−1,1]²: half a texel in from the corner, shifted by the border.
+    #[inline]
     pub fn taps(&self, oct: Vec2) -> Taps {
         let side = self.side();
         let p = (oct * 0.5 + 0.5) * self.resolution as f32 - 0.5 + self.border as f32;
         let p = p.clamp(Vec2::ZERO, Vec2::splat((side - 1) as f32));
-        let corner = p.floor().min(Vec2::splat(side.saturating_sub(2) as f32));
-        let f = p - corner;
-        let (x, y) = (corner.x as u32, corner.y as u32);
+        let inner = side.saturating_sub(2) as u32;
+        let (x, y) = ((p.x as u32).min(inner), (p.y as u32).min(inner));
+        let f = p - Vec2::new(x as f32, y as f32);
         let last = side as u32 - 1;
         let (x1, y1) = ((x + 1).min(last), (y + 1).min(last));
         let side = side as u32;

@@ -4,6 +4,7 @@
 //! [`encode`] → [`file`]; [`volume`] and [`query`] are what shading uses, and the solver with it.
 
 pub mod capture;
+pub mod checkpoint;
 pub mod container;
 pub mod encode;
 pub mod file;

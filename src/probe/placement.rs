@@ -35,7 +35,8 @@ impl ProbeState {
 pub struct PlacementSettings {
     /// Rays that decide about one probe.
     pub rays: u32,
-    /// A probe counts as inside geometry when more than this share of its rays meet the back of a surface.
+    /// A probe counts as inside geometry (or outside the world) when more than this share of what its rays meet are
+    /// backs of surfaces.
     pub back_face_share: f32,
     /// Move probes that are inside geometry, or touch it, into the open where it is near.
     pub relocate: bool,
@@ -110,6 +111,7 @@ const MAX_MOVES: usize = 4;
 #[derive(Debug, Clone, Copy)]
 pub struct Surroundings {
     rays: u64,
+    hits: u64,
     backs: u64,
     emitting: u64,
     /// Distance and direction of the nearest back, and of the nearest front.
@@ -125,6 +127,7 @@ impl Default for Surroundings {
         let nothing = (f32::INFINITY, Vec3::ZERO);
         Surroundings {
             rays: 0,
+            hits: 0,
             backs: 0,
             emitting: 0,
             nearest_back: nothing,
@@ -154,6 +157,7 @@ impl Settler<'_, '_> {
                 found.emitting += u64::from(self.world.emitters.has_sky());
                 continue;
             };
+            found.hits += 1;
             found.emitting += u64::from(surface.emission != Vec3::ZERO);
             let nearest = if surface.is_back() {
                 found.backs += 1;
@@ -170,7 +174,7 @@ impl Settler<'_, '_> {
 
     /// Whether so many of them are backs that the position lies inside something.
     pub fn is_inside(&self, around: &Surroundings) -> bool {
-        around.backs as f32 > self.settings.back_face_share * around.rays as f32
+        around.backs as f32 > self.settings.back_face_share * around.hits as f32
     }
 
     /// Where a probe with these surroundings should rather be; `None` where it is well placed.

@@ -2,11 +2,11 @@
 //!
 //! Every published weighting is a value of [`QuerySettings`]; the factors multiply in the order of its fields.
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec3A};
 use serde::{Deserialize, Serialize};
 
 use super::grid::ProbeIndex;
-use super::surface_visibility::Seen;
+use super::surface_visibility::{Facing, Seen};
 use super::volume::Volume;
 use crate::math::octahedral::oct_from_direction;
 
@@ -81,6 +81,11 @@ impl QuerySettings {
     pub fn reach(&self) -> f32 {
         self.normal_bias.abs() + self.view_bias.abs()
     }
+
+    /// Whether weights depend on the point's shading normal.
+    pub fn weighs_by_normal(&self) -> bool {
+        self.direction != DirectionWeight::Uniform || self.normal_bias != 0.0
+    }
 }
 
 /// A surface point that asks for irradiance.
@@ -90,8 +95,8 @@ pub struct QueryPoint {
     pub position: Vec3,
     /// Shading normal, unit: irradiance is asked for around it.
     pub normal: Vec3,
-    /// Unit, on the viewer's side.
-    pub geometric_normal: Vec3,
+    /// Of the geometric normal on the viewer's side.
+    pub facing: Facing,
     /// Unit, towards the viewer; in the bake towards the probe.
     pub view: Vec3,
 }
@@ -133,7 +138,7 @@ impl Query<'_> {
         let grid = &volume.grid;
         let cell = grid.cell(point.position);
         let seen = match (visibility, &volume.surface_visibility) {
-            (Visibility::Stored, Some(surface)) => surface.look_up(grid, point.position, point.geometric_normal),
+            (Visibility::Stored, Some(surface)) => surface.look_up(grid, point.position, point.facing),
             (Visibility::Exact(mask), _) => Seen { mask, far: None },
             _ => Seen { mask: u8::MAX, far: None },
         };
@@ -152,8 +157,8 @@ impl Query<'_> {
             if trilinear <= 0.0 || seen.mask >> i & 1 == 0 || !volume.is_active(probe) {
                 continue;
             }
-            let to_probe = volume.position(probe) - point.position;
-            let mut weight = settings.direction.at(to_probe.normalize_or_zero().dot(point.normal));
+            let to_probe = || (volume.position(probe) - point.position).normalize_or_zero();
+            let mut weight = settings.direction.at(|| to_probe().dot(point.normal));
             if let (Visibility::Stored, VisibilitySettings::Moments { power, floor }) =
                 (visibility, settings.visibility)
             {
@@ -196,35 +201,36 @@ impl Query<'_> {
 
     /// Irradiance around the point's normal, W·m⁻²; zero where no probe counts.
     pub fn irradiance(&self, point: &QueryPoint, visibility: Visibility) -> Vec3 {
-        self.blend(&self.weights(point, visibility), point.normal)
+        self.blend(&self.weights(point, visibility), oct_from_direction(point.normal))
     }
 
-    /// Weighted mean of the probes' irradiance around `normal`.
-    pub fn blend(&self, corners: &CornerWeights, normal: Vec3) -> Vec3 {
+    /// Weighted mean of the probes' irradiance around the direction `oct`.
+    pub fn blend(&self, corners: &CornerWeights, oct: Vec2) -> Vec3 {
         let total = corners.total();
         if total <= 0.0 {
             return Vec3::ZERO;
         }
         let volume = self.volume;
         // One set of taps serves all eight probes: they share the direction.
-        let taps = volume.irradiance.taps(oct_from_direction(normal));
-        let mut sum = Vec3::ZERO;
+        let taps = volume.irradiance.taps(oct);
+        let per_total = 1.0 / total;
+        let mut sum = Vec3A::ZERO;
         for (probe, weight) in corners.probes.iter().zip(corners.weights) {
             if weight > 0.0 {
                 let irradiance = volume.curve.decode(volume.irradiance.sample(probe.0 as usize, &taps));
-                sum += self.settings.blend.forward(irradiance) * (weight / total);
+                sum += self.settings.blend.forward(irradiance) * (weight * per_total);
             }
         }
-        self.settings.blend.backward(sum)
+        self.settings.blend.backward(sum).into()
     }
 }
 
 impl DirectionWeight {
-    fn at(self, cosine: f32) -> f32 {
+    fn at(self, cosine: impl FnOnce() -> f32) -> f32 {
         match self {
             DirectionWeight::Uniform => 1.0,
-            DirectionWeight::Cosine { floor } => cosine.max(floor),
-            DirectionWeight::Wrap { offset } => (0.5 * (cosine + 1.0)).powi(2) + offset,
+            DirectionWeight::Cosine { floor } => cosine().max(floor),
+            DirectionWeight::Wrap { offset } => (0.5 * (cosine() + 1.0)).powi(2) + offset,
         }
     }
 }
@@ -234,14 +240,14 @@ impl Blend {
         self == Blend::Linear
     }
 
-    fn forward(self, irradiance: Vec3) -> Vec3 {
+    fn forward(self, irradiance: Vec3A) -> Vec3A {
         match self {
             Blend::Linear => irradiance,
-            Blend::SquareRoot => irradiance.max(Vec3::ZERO).map(f32::sqrt),
+            Blend::SquareRoot => irradiance.max(Vec3A::ZERO).map(f32::sqrt),
         }
     }
 
-    fn backward(self, sum: Vec3) -> Vec3 {
+    fn backward(self, sum: Vec3A) -> Vec3A {
         match self {
             Blend::Linear => sum,
             Blend::SquareRoot => sum * sum,

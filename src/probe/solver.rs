@@ -4,20 +4,19 @@
 //! query with the method's own weights: Jacobi's iteration for (I − T)B = B⁰, whose error shrinks by about the mean
 //! albedo per sweep.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::capture::ProbeCapture;
+use super::capture::{ProbeCapture, Surfel};
 use super::filter::Kernel;
-use super::grid::ProbeIndex;
 use super::map::fill_with_border;
 use super::placement::ProbeState;
 use super::query::{Query, QueryPoint, QuerySettings, Visibility};
 use super::volume::Volume;
 use crate::light::lambert::reflected_radiance;
 use crate::math::color::luminance;
-use crate::math::octahedral::texel_direction;
+use crate::math::octahedral::{direction_from_oct, texel_direction};
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -37,7 +36,7 @@ impl Default for SolverSettings {
 }
 
 /// One sweep.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Bounce {
     pub index: u32,
     /// Largest change of any irradiance texel ÷ largest irradiance texel.
@@ -46,13 +45,30 @@ pub struct Bounce {
     pub energy: f64,
 }
 
-#[derive(Debug, Clone, Default)]
+/// How far the iteration has come; at its end, the result's figures.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Solution {
     pub bounces: Vec<Bounce>,
     pub converged: bool,
     /// Ratio of the last two changes; `None` before there are two.
     pub spectral_radius_estimate: Option<f64>,
+    /// Largest change of any irradiance texel in the last sweep, W·m⁻²; `None` before there was a second sweep.
+    pub last_change: Option<f64>,
     pub non_finite: u64,
+}
+
+impl Solution {
+    /// Takes the largest change of a sweep into account.
+    fn judge(&mut self, change: f64, residual: f64, settings: &SolverSettings) {
+        if let Some(previous) = self.last_change.filter(|&p| p > 0.0) {
+            self.spectral_radius_estimate = Some(change / previous);
+        }
+        // What is still to come is a geometric series in the ratio of the changes.
+        let ratio = self.spectral_radius_estimate.unwrap_or(f64::from(settings.albedo_max));
+        let missing = if ratio < 1.0 { residual * ratio / (1.0 - ratio) } else { f64::INFINITY };
+        self.last_change = Some(change);
+        self.converged = change == 0.0 || missing <= f64::from(settings.tolerance);
+    }
 }
 
 /// Where the captures of all probes come from: memory, or traced again.
@@ -77,82 +93,104 @@ pub struct Solver<'a, C> {
     pub gathers_emission: bool,
 }
 
+/// What a sweep finds at one probe; empty where it is not active.
+#[derive(Debug, Default)]
+struct Swept {
+    /// Interior texels, W·m⁻².
+    irradiance: Vec<Vec3A>,
+    non_finite: u64,
+}
+
 impl<C: Captures> Solver<'_, C> {
-    /// Fills the volume's irradiance. Its positions, states and visibility must stand already.
-    pub fn solve(&self, volume: &mut Volume, on_bounce: impl Fn(&Bounce)) -> Solution {
+    /// Fills the volume's irradiance. Its positions, states and visibility must stand already; after an interruption its
+    /// irradiance too, as it was when `progress` was reported.
+    pub fn solve(
+        &self,
+        volume: &mut Volume,
+        mut progress: Solution,
+        mut on_bounce: impl FnMut(&Solution, &Volume),
+    ) -> Solution {
         let settings = self.settings;
-        let mut solution = Solution::default();
-        let mut previous_change = None;
-        for index in 0..=settings.max_bounces {
-            let (irradiance, non_finite) = self.sweep(volume, index);
-            solution.non_finite += non_finite;
-            let bounce = measure(volume, &irradiance, index);
-            store(volume, &irradiance);
-            on_bounce(&bounce.0);
-            solution.bounces.push(bounce.0);
-            let change = bounce.1;
-            if index > 0 {
-                if let Some(previous) = previous_change.filter(|&p| p > 0.0) {
-                    solution.spectral_radius_estimate = Some(change / previous);
-                }
-                // What is still to come is a geometric series in the ratio of the changes.
-                let ratio = solution.spectral_radius_estimate.unwrap_or(f64::from(settings.albedo_max));
-                let missing = if ratio < 1.0 { bounce.0.residual * ratio / (1.0 - ratio) } else { f64::INFINITY };
-                previous_change = Some(change);
-                if change == 0.0 || missing <= f64::from(settings.tolerance) {
-                    solution.converged = true;
-                    break;
-                }
+        let mut masks = None;
+        for index in progress.bounces.len() as u32..=settings.max_bounces {
+            if progress.converged {
+                break;
             }
+            // Before the first sweep there is nothing in the probes to ask for.
+            let masks = (index > 0).then(|| &*masks.get_or_insert_with(|| self.masks(volume)));
+            let swept = self.sweep(volume, masks.map(Vec::as_slice));
+            progress.non_finite += swept.iter().map(|s| s.non_finite).sum::<u64>();
+            let (bounce, change) = measure(volume, &swept, index);
+            store(volume, &swept);
+            progress.bounces.push(bounce);
+            if index > 0 {
+                progress.judge(change, bounce.residual, settings);
+            }
+            on_bounce(&progress, volume);
         }
         if !self.gathers_emission {
             self.add_emission(volume);
         }
-        solution
+        progress
     }
 
-    /// Irradiance of every probe (interior texels) from the outgoing radiance that the present irradiance gives.
-    fn sweep(&self, volume: &Volume, index: u32) -> (Vec<Vec<Vec3>>, u64) {
+    /// Of every probe's surfels: the corners of its cell that it sees, 0 where it must be looked up again. Neither
+    /// surfels nor probes move, so once is enough; empty where the method does not store visibility at surfaces.
+    fn masks(&self, volume: &Volume) -> Vec<Vec<u8>> {
+        let Some(surface) = &volume.surface_visibility else { return vec![Vec::new(); volume.states.len()] };
+        let of_probe = |p: usize| -> Vec<u8> {
+            if volume.states[p] != ProbeState::Active {
+                return Vec::new();
+            }
+            self.captures.with(p, |capture| {
+                capture.surfels.iter().map(|s| surface.look_up(&volume.grid, s.position, s.facing).mask).collect()
+            })
+        };
+        (0..volume.states.len()).into_par_iter().map(of_probe).collect()
+    }
+
+    /// Irradiance of every probe from the outgoing radiance that the present irradiance gives; without `masks` from the
+    /// direct radiance alone.
+    fn sweep(&self, volume: &Volume, masks: Option<&[Vec<u8>]>) -> Vec<Swept> {
         let kernel = self.kernel;
         let query = Query { volume, settings: self.query };
         let probe = |p: usize| {
             if volume.states[p] != ProbeState::Active {
-                return (Vec::new(), 0);
+                return Swept::default();
             }
-            let position = volume.position(ProbeIndex(p as u32));
             self.captures.with(p, |capture| {
-                let mut radiance = if self.gathers_emission {
-                    capture.emitted.clone()
-                } else {
-                    vec![Vec3::ZERO; capture.emitted.len()]
-                };
+                let mut radiance =
+                    if self.gathers_emission { capture.emitted_radiance() } else { vec![Vec3A::ZERO; capture.texels] };
                 let mut non_finite = 0;
-                for surfel in &capture.surfels {
+                for (i, surfel) in capture.surfels.iter().enumerate() {
                     let mut outgoing = surfel.direct_radiance;
-                    // Before the first sweep there is nothing in the probes to ask for.
-                    if index > 0 {
-                        let point = QueryPoint {
-                            position: surfel.position,
-                            normal: surfel.normal,
-                            geometric_normal: surfel.geometric_normal,
-                            view: (position - surfel.position).normalize_or_zero(),
+                    if let Some(masks) = masks {
+                        let visibility = match masks[p].get(i) {
+                            None | Some(0) => Visibility::Stored,
+                            Some(&mask) => Visibility::Exact(mask),
                         };
-                        outgoing += reflected_radiance(surfel.albedo, query.irradiance(&point, Visibility::Stored));
+                        let weights = query.weights(&self.query_point(surfel, volume.positions[p]), visibility);
+                        outgoing += reflected_radiance(surfel.albedo(), query.blend(&weights, surfel.oct()));
                     }
                     if outgoing.is_finite() {
-                        radiance[surfel.texel as usize] += outgoing * surfel.weight;
+                        radiance[surfel.texel as usize] += Vec3A::from(outgoing);
                     } else {
                         non_finite += 1;
                     }
                 }
-                let mut irradiance = vec![Vec3::ZERO; kernel.rows()];
+                let mut irradiance = vec![Vec3A::ZERO; kernel.rows()];
                 kernel.irradiance(&radiance, &mut irradiance);
-                (irradiance, non_finite)
+                Swept { irradiance, non_finite }
             })
         };
-        let found: Vec<(Vec<Vec3>, u64)> = (0..volume.states.len()).into_par_iter().map(probe).collect();
-        let non_finite = found.iter().map(|f| f.1).sum();
-        (found.into_iter().map(|f| f.0).collect(), non_finite)
+        (0..volume.states.len()).into_par_iter().map(probe).collect()
+    }
+
+    /// How a probe asks for the light at a surfel. What the method does not look at is left zero.
+    fn query_point(&self, surfel: &Surfel, probe: Vec3) -> QueryPoint {
+        let normal = if self.query.weighs_by_normal() { direction_from_oct(surfel.oct()) } else { Vec3::ZERO };
+        let view = if self.query.view_bias != 0.0 { (probe - surfel.position).normalize_or_zero() } else { Vec3::ZERO };
+        QueryPoint { position: surfel.position, normal, facing: surfel.facing, view }
     }
 
     /// Adds the emitted light that probes see themselves: from their rays and from the emitters sampled at their centres.
@@ -168,12 +206,12 @@ impl<C: Captures> Solver<'_, C> {
                 return;
             }
             self.captures.with(p, |capture| {
-                let mut emitted = vec![Vec3::ZERO; kernel.rows()];
-                kernel.irradiance(&capture.emitted, &mut emitted);
+                let mut emitted = vec![Vec3A::ZERO; kernel.rows()];
+                kernel.irradiance(&capture.emitted_radiance(), &mut emitted);
                 for (o, value) in emitted.iter_mut().enumerate() {
                     let at = (o / resolution + border) * side + o % resolution + border;
                     let normal = texel_direction(o % resolution, o / resolution, resolution);
-                    *value += curve.decode(out[at]) + capture.sampled_emitter_irradiance(normal);
+                    *value += curve.decode(out[at]) + Vec3A::from(capture.sampled_emitter_irradiance(normal));
                     *value = curve.encode(*value);
                 }
                 fill_with_border(&emitted, resolution, border, out);
@@ -183,22 +221,23 @@ impl<C: Captures> Solver<'_, C> {
 }
 
 /// The sweep's figures, and its largest change in W·m⁻².
-fn measure(volume: &Volume, irradiance: &[Vec<Vec3>], index: u32) -> (Bounce, f64) {
+fn measure(volume: &Volume, swept: &[Swept], index: u32) -> (Bounce, f64) {
     let maps = &volume.irradiance;
     let (resolution, border, side) = (maps.resolution, maps.border, maps.side());
-    let per_probe = |(p, new): (usize, &Vec<Vec3>)| {
+    let per_probe = |(p, swept): (usize, &Swept)| {
+        let new = &swept.irradiance;
         let old = maps.probe(p);
         let (mut change, mut largest, mut energy) = (0.0f32, 0.0f32, 0.0f64);
         for (o, value) in new.iter().enumerate() {
             let at = (o / resolution + border) * side + o % resolution + border;
             change = change.max((*value - volume.curve.decode(old[at])).abs().max_element());
             largest = largest.max(value.max_element());
-            energy += f64::from(luminance(*value));
+            energy += f64::from(luminance((*value).into()));
         }
         (change, largest, energy, new.len())
     };
     // Collected in order and summed on one thread: the same energy for any number of threads.
-    let found: Vec<_> = irradiance.par_iter().enumerate().map(per_probe).collect();
+    let found: Vec<_> = swept.par_iter().enumerate().map(per_probe).collect();
     let change = f64::from(found.iter().map(|f| f.0).fold(0.0, f32::max));
     let largest = f64::from(found.iter().map(|f| f.1).fold(0.0, f32::max));
     let texels: usize = found.iter().map(|f| f.3).sum();
@@ -206,13 +245,13 @@ fn measure(volume: &Volume, irradiance: &[Vec<Vec3>], index: u32) -> (Bounce, f6
     (Bounce { index, residual: if largest > 0.0 { change / largest } else { 0.0 }, energy }, change)
 }
 
-fn store(volume: &mut Volume, irradiance: &[Vec<Vec3>]) {
+fn store(volume: &mut Volume, swept: &[Swept]) {
     let (resolution, border) = (volume.irradiance.resolution, volume.irradiance.border);
     let curve = volume.curve;
     let n = volume.irradiance.texels_per_probe();
-    volume.irradiance.texels.par_chunks_mut(n).zip(irradiance).for_each(|(out, interior)| {
-        if !interior.is_empty() {
-            let encoded: Vec<Vec3> = interior.iter().map(|&e| curve.encode(e)).collect();
+    volume.irradiance.texels.par_chunks_mut(n).zip(swept).for_each(|(out, swept)| {
+        if !swept.irradiance.is_empty() {
+            let encoded: Vec<Vec3A> = swept.irradiance.iter().map(|&e| curve.encode(e)).collect();
             fill_with_border(&encoded, resolution, border, out);
         }
     });

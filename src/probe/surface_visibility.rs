@@ -96,10 +96,9 @@ struct Tally {
 
 impl SurfaceVisibility {
     /// What a surface point sees. Everything where nothing is known.
-    pub fn look_up(&self, grid: &Grid, position: Vec3, geometric_normal: Vec3) -> Seen {
+    pub fn look_up(&self, grid: &Grid, position: Vec3, facing: Facing) -> Seen {
         let cell = grid.cell(position);
         let n = self.voxels_per_cell;
-        let facing = facing(geometric_normal);
         let index = grid.cell_index(cell.base);
         let first = self.cell_start[index] as usize;
         let keys = &self.keys[first..self.cell_start[index + 1] as usize];
@@ -120,7 +119,7 @@ impl SurfaceVisibility {
     /// Mask of the voxel across a border that the point is close to, 0 where there is none.
     ///
     /// Where walls meet, the survey may miss a strip much narrower than a voxel; it continues in the next one.
-    fn beside(&self, keys: &[u16], first: usize, fraction: Vec3, facing: u32) -> u8 {
+    fn beside(&self, keys: &[u16], first: usize, fraction: Vec3, facing: Facing) -> u8 {
         let n = self.voxels_per_cell;
         let voxel = voxel_of(fraction, n);
         let inside = fraction * n as f32 - voxel.as_vec3();
@@ -236,14 +235,19 @@ fn voxel_of(fraction: Vec3, n: u32) -> UVec3 {
     (fraction * n as f32).as_uvec3().min(UVec3::splat(n - 1))
 }
 
-fn key(voxel: UVec3, facing: u32, n: u32) -> u16 {
-    ((voxel.x + n * (voxel.y + n * voxel.z)) * 6 + facing) as u16
+fn key(voxel: UVec3, facing: Facing, n: u32) -> u16 {
+    ((voxel.x + n * (voxel.y + n * voxel.z)) * 6) as u16 + u16::from(facing.0)
 }
 
 /// Main direction of a normal: 2·axis + (1 where negative).
-fn facing(normal: Vec3) -> u32 {
-    let axis = normal.abs().max_position() as u32;
-    2 * axis + u32::from(normal[axis as usize] < 0.0)
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Facing(u8);
+
+impl Facing {
+    pub fn of(normal: Vec3) -> Facing {
+        let axis = normal.abs().max_position();
+        Facing(2 * axis as u8 + u8::from(normal[axis] < 0.0))
+    }
 }
 
 /// The entry that faces the same way in the nearest voxel, else any in the same voxel.
@@ -343,13 +347,13 @@ impl Survey<'_> {
                     if !triangle_meets_box(around, Vec3::splat(0.5 + VOXEL_MARGIN)) {
                         continue;
                     }
-                    let stream = u64::from(cell_index) << 16 | u64::from(key(voxel, 0, self.n));
+                    let stream = u64::from(cell_index) << 16 | u64::from(key(voxel, Facing(0), self.n));
                     for (side, normal) in [(0u64, outward), (1, -outward)] {
                         let mut random =
                             Random::new(self.seed, Purpose::SurfaceVisibility, stream, 2 * u64::from(triangle) + side);
                         let outside = side == 0 || double_sided;
                         let tally = self.tally(corners, &around, normal, outside, base, active, &mut random);
-                        out.push((cell_index, key(voxel, facing(normal), self.n), tally));
+                        out.push((cell_index, key(voxel, Facing::of(normal), self.n), tally));
                     }
                 }
             }

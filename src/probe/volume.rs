@@ -1,6 +1,6 @@
 //! Probes ready to be asked: decoded to floats, in memory.
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec3A};
 use serde::{Deserialize, Serialize};
 
 use super::grid::{Grid, ProbeIndex};
@@ -21,15 +21,16 @@ pub enum IrradianceCurve {
 
 impl IrradianceCurve {
     /// Stored value of an irradiance, W·m⁻²; inverse of [`Self::decode`].
-    pub fn encode(self, irradiance: Vec3) -> Vec3 {
+    pub fn encode(self, irradiance: Vec3A) -> Vec3A {
         match self {
             IrradianceCurve::Linear => irradiance,
-            IrradianceCurve::Gamma5Over2Pi => (irradiance.max(Vec3::ZERO) / (2.0 * PI)).powf(0.2),
+            IrradianceCurve::Gamma5Over2Pi => (irradiance.max(Vec3A::ZERO) / (2.0 * PI)).powf(0.2),
         }
     }
 
     /// Irradiance, W·m⁻², of a stored value; inverse of [`Self::encode`].
-    pub fn decode(self, stored: Vec3) -> Vec3 {
+    #[inline]
+    pub fn decode(self, stored: Vec3A) -> Vec3A {
         match self {
             IrradianceCurve::Linear => stored,
             IrradianceCurve::Gamma5Over2Pi => {
@@ -54,8 +55,8 @@ pub struct Volume {
     pub states: Vec<ProbeState>,
     /// Relative to the scene's origin, metres.
     pub positions: Vec<Vec3>,
-    /// In the domain of `curve`.
-    pub irradiance: OctahedralMaps<Vec3>,
+    /// In the domain of `curve`; four floats a texel, so that a look-up adds whole registers.
+    pub irradiance: OctahedralMaps<Vec3A>,
     pub curve: IrradianceCurve,
     /// Mean and standard deviation of distance, metres.
     pub distance: Option<OctahedralMaps<Vec2>>,
@@ -78,6 +79,6 @@ impl Volume {
     /// Irradiance stored in one probe around the direction of these taps, W·m⁻².
     pub fn probe_irradiance(&self, probe: ProbeIndex, normal: Vec3) -> Vec3 {
         let taps = self.irradiance.taps(crate::math::octahedral::oct_from_direction(normal));
-        self.curve.decode(self.irradiance.sample(probe.0 as usize, &taps))
+        self.curve.decode(self.irradiance.sample(probe.0 as usize, &taps)).into()
     }
 }

@@ -13,7 +13,8 @@ static LINEAR_FROM_SRGB8: LazyLock<[f32; 256]> =
 
 impl Texture {
     /// Linear RGBA of one texel, indices in range.
-    pub fn texel(&self, x: u32, y: u32) -> Vec4 {
+    #[inline]
+    fn texel(&self, x: u32, y: u32) -> Vec4 {
         let i = y as usize * self.width as usize + x as usize;
         match &self.texels {
             Texels::Rgba32F(data) => data[i],
@@ -21,7 +22,8 @@ impl Texture {
                 let [r, g, b, a] = data[i];
                 let unit = |code: u8| f32::from(code) * (1.0 / 255.0);
                 if *srgb {
-                    let linear = |code: u8| LINEAR_FROM_SRGB8[code as usize];
+                    let table: &[f32; 256] = &LINEAR_FROM_SRGB8;
+                    let linear = |code: u8| table[code as usize];
                     Vec4::new(linear(r), linear(g), linear(b), unit(a))
                 } else {
                     Vec4::new(unit(r), unit(g), unit(b), unit(a))
@@ -37,25 +39,28 @@ impl Texture {
         }
         let size = Vec2::new(self.width as f32, self.height as f32);
         if self.nearest {
-            let p = (uv * size).floor();
-            return self.texel(self.wrapped(0, p.x), self.wrapped(1, p.y));
+            let p = uv * size;
+            return self.texel(self.wrapped(0, floor(p.x)), self.wrapped(1, floor(p.y)));
         }
         let p = uv * size - 0.5;
-        let corner = p.floor();
-        let f = p - corner;
-        let x = [self.wrapped(0, corner.x), self.wrapped(0, corner.x + 1.0)];
-        let y = [self.wrapped(1, corner.y), self.wrapped(1, corner.y + 1.0)];
+        let (column, row) = (floor(p.x), floor(p.y));
+        let f = p - Vec2::new(column as f32, row as f32);
+        let x = [self.wrapped(0, column), self.wrapped(0, column.saturating_add(1))];
+        let y = [self.wrapped(1, row), self.wrapped(1, row.saturating_add(1))];
         let top = self.texel(x[0], y[0]).lerp(self.texel(x[1], y[0]), f.x);
         let bottom = self.texel(x[0], y[1]).lerp(self.texel(x[1], y[1]), f.x);
         top.lerp(bottom, f.y)
     }
 
-    /// Texel index along `axis` of an integral coordinate that may lie outside.
-    fn wrapped(&self, axis: usize, coordinate: f32) -> u32 {
+    /// Texel index along `axis` of a coordinate that may lie outside.
+    #[inline]
+    fn wrapped(&self, axis: usize, i: i64) -> u32 {
         let size = if axis == 0 { self.width } else { self.height };
-        // `as` saturates and sends NaN to 0, so hostile texture coordinates stay in range.
-        let i = coordinate as i64;
         let n = i64::from(size);
+        // Most look-ups lie inside, and spare the division.
+        if (0..n).contains(&i) {
+            return i as u32;
+        }
         let wrapped = match self.wrap[axis] {
             Wrap::Repeat => i.rem_euclid(n),
             Wrap::ClampToEdge => i.clamp(0, n - 1),
@@ -66,6 +71,14 @@ impl Texture {
         };
         wrapped as u32
     }
+}
+
+/// Largest integer not above `x`. `f32::floor` is a function call on processors without SSE 4.1, and so on the
+/// baseline that the crate is compiled for. `as` saturates and sends NaN to 0: hostile coordinates stay in range.
+#[inline]
+fn floor(x: f32) -> i64 {
+    let truncated = x as i64;
+    truncated.saturating_sub(i64::from(truncated as f32 > x))
 }
 
 #[cfg(test)]

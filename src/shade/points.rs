@@ -7,6 +7,7 @@ use crate::light::World;
 use crate::light::surface::SurfacePoint;
 use crate::math::random::{Purpose, Random};
 use crate::probe::query::QueryPoint;
+use crate::probe::surface_visibility::Facing;
 use crate::scene::{AlphaMode, Camera};
 use crate::trace::Ray;
 
@@ -35,7 +36,7 @@ impl ImagePoint {
         QueryPoint {
             position: self.surface.position,
             normal: self.normal,
-            geometric_normal: self.surface.geometric_normal,
+            facing: Facing::of(self.surface.geometric_normal),
             view: self.view,
         }
     }

@@ -51,10 +51,14 @@ pub struct Circumstances {
 pub struct Checkpoint {
     pub path: PathBuf,
     pub resume: bool,
+    /// Least time between two checkpoints.
+    pub interval: Duration,
 }
 
-/// Time between two checkpoints: short bakes write none.
-const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(10);
+impl Checkpoint {
+    /// Short bakes write none.
+    pub const INTERVAL: Duration = Duration::from_secs(10);
+}
 
 /// Everything decided before tracing the captures.
 pub struct Prepared<'w, 's> {
@@ -270,7 +274,7 @@ impl Prepared<'_, '_> {
         };
         let identity = format!("{} seed {} {}", scene.blake3, circumstances.seed, config.to_ron());
         let mut progress = Solution::default();
-        if let Some(Checkpoint { path, resume: true }) = &circumstances.checkpoint
+        if let Some(Checkpoint { path, resume: true, .. }) = &circumstances.checkpoint
             && path.exists()
         {
             progress = checkpoint::read(path, &identity, &mut volume)?;
@@ -281,8 +285,8 @@ impl Prepared<'_, '_> {
             bar.set_position(progress.bounces.len() as u64);
             let residual = progress.bounces.last().map_or(0.0, |b| b.residual);
             bar.set_message(format!("residual {residual:.1e}"));
-            if let Some(Checkpoint { path, .. }) = &circumstances.checkpoint
-                && last_saved.elapsed() > CHECKPOINT_INTERVAL
+            if let Some(Checkpoint { path, interval, .. }) = &circumstances.checkpoint
+                && last_saved.elapsed() >= *interval
                 && saved.is_ok()
             {
                 saved = checkpoint::write(path, &identity, progress, volume);
@@ -377,4 +381,53 @@ impl Prepared<'_, '_> {
 
 fn count(placement: &Placement, state: ProbeState) -> usize {
     placement.states.iter().filter(|&&s| s == state).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{self, LoadOptions};
+
+    /// Bakes the open rooms coarsely.
+    fn bake(checkpoint: Option<Checkpoint>, max_bounces: u32) -> Baked {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/two_rooms_open.glb");
+        let scene = scene::load(&path, &LoadOptions::default()).unwrap();
+        let set = ["grid.spacing_m=2".to_owned(), format!("solver.max_bounces={max_bounces}")];
+        let config = Config::default().with_overrides(&set).unwrap();
+        let world = World::new(&scene, config.lights.punctual_scale, config.solver.albedo_max).unwrap();
+        let circumstances =
+            Circumstances { seed: 1, memory_budget_bytes: None, progress: Progress::hidden(), checkpoint };
+        let record = SceneRecord { name: scene.name.clone(), blake3: scene.blake3.clone() };
+        prepare(&world, &config, &circumstances).unwrap().bake(&circumstances, &record).unwrap()
+    }
+
+    #[test]
+    fn a_resumed_bake_gives_the_same_bytes() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.resume");
+        let checkpoint = |resume| Checkpoint { path: path.clone(), resume, interval: Duration::ZERO };
+        let whole = bake(None, 64);
+        assert!(!path.exists());
+        // With an interval of zero every sweep is saved; the last stands.
+        bake(Some(checkpoint(false)), 64);
+        let saved = std::fs::read(&path).unwrap();
+        let resumed = bake(Some(checkpoint(true)), 64);
+        assert_eq!(std::fs::read(&path).unwrap(), saved, "nothing was left to sweep");
+        assert_eq!(resumed.container, whole.container);
+        assert_eq!(resumed.solution, whole.solution);
+    }
+
+    #[test]
+    fn a_bake_is_resumed_from_the_middle() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.resume");
+        let checkpoint = |resume| Checkpoint { path: path.clone(), resume, interval: Duration::ZERO };
+        bake(Some(checkpoint(false)), 3);
+        // The checkpoint of a bake with other settings, relabelled as one of this: three sweeps done, the rest to do.
+        let mut container = Container::read(&path).unwrap();
+        let identity = container.metadata["identity"].replace("max_bounces: 3", "max_bounces: 64");
+        container.metadata.insert("identity".into(), identity);
+        container.write(&path).unwrap();
+        assert_eq!(bake(Some(checkpoint(true)), 64).container, bake(None, 64).container);
+    }
 }

@@ -10,6 +10,7 @@ use crate::bake::{Baked, Checkpoint, Circumstances, Prepared, prepare};
 use crate::cli::BakeArgs;
 use crate::config::{Config, presets};
 use crate::light::World;
+use crate::output::check_writable;
 use crate::plan::Line;
 use crate::probe::checkpoint;
 use crate::probe::file::SceneRecord;
@@ -29,7 +30,10 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     }
     let path = args.scene.as_deref().context("no scene: give a .glb or .gltf file")?;
     if !args.dry_run {
-        args.output.as_ref().context("no output: give -o OUT.probes")?;
+        let output = args.output.as_ref().context("no output: give -o OUT.probes")?;
+        // Said now rather than after an hour's bake.
+        check_writable(output)?;
+        args.report.as_deref().map_or(Ok(()), check_writable)?;
     }
     let threads = set_threads(args.trace.threads)?;
 
@@ -39,18 +43,18 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     let accel_started = Instant::now();
     let world = World::new(&scene, config.lights.punctual_scale, config.solver.albedo_max)?;
     let accel_build_s = accel_started.elapsed().as_secs_f64();
-    warn_if_dark(&world, path, console);
 
     let circumstances = Circumstances {
         seed: args.trace.seed,
         memory_budget_bytes: args.memory_budget,
         progress: console.progress,
-        checkpoint: args
-            .output
-            .as_ref()
-            .map(|output| Checkpoint { path: checkpoint::path_for(output), resume: args.resume }),
+        checkpoint: args.output.as_ref().map(|output| Checkpoint {
+            path: checkpoint::path_for(output),
+            resume: args.resume,
+            interval: Checkpoint::INTERVAL,
+        }),
     };
-    if let Some(Checkpoint { path, resume: true }) = &circumstances.checkpoint
+    if let Some(Checkpoint { path, resume: true, .. }) = &circumstances.checkpoint
         && !path.exists()
     {
         console.warn(format!("--resume: there is no {}; starting anew", path.display()));
@@ -59,7 +63,9 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     if args.dry_run {
         return dry_run(&prepared, &circumstances, console);
     }
+    let raw_started = Instant::now();
     let raw = args.measure_raw.then(|| prepared.raw_rays_per_s(&circumstances)).flatten();
+    let raw_s = raw_started.elapsed().as_secs_f64();
     let record = SceneRecord { name: scene.name.clone(), blake3: scene.blake3.clone() };
     let mut baked = prepared.bake(&circumstances, &record)?;
 
@@ -71,7 +77,8 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     baked.times.write = write_started.elapsed().as_secs_f64();
     baked.times.load = load_s;
     baked.times.accel_build = accel_build_s;
-    baked.times.total = started.elapsed().as_secs_f64();
+    // The measurement is no part of the bake.
+    baked.times.total = started.elapsed().as_secs_f64() - raw_s;
 
     let report = report(&baked, &config, &scene, args.trace.seed, threads, file_bytes, raw);
     warn_about(&report, console);
@@ -104,15 +111,6 @@ fn resolve_config(args: &BakeArgs) -> Result<Config> {
         None => {}
     }
     Ok(config)
-}
-
-fn warn_if_dark(world: &World, path: &Path, console: &Console) {
-    if world.scene.lights.is_empty() && !world.has_emitters() {
-        console.warn(format!(
-            "{}: the scene holds no light and everything will be black; give it a sky with --env R,G,B or --env FILE.hdr",
-            path.display()
-        ));
-    }
 }
 
 fn dry_run(prepared: &Prepared, circumstances: &Circumstances, console: &Console) -> Result<()> {

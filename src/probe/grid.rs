@@ -187,6 +187,12 @@ impl Grid {
         (self.origin - margin, self.origin + last * self.spacing + margin)
     }
 
+    /// Whether a point lies in the probes' hull.
+    pub fn is_within(&self, position: Vec3) -> bool {
+        let g = self.grid_from_scene(position);
+        g.cmpge(Vec3::ZERO).all() && g.cmple((self.divisions - UVec3::ONE).as_vec3()).all()
+    }
+
     /// The cell of a point; points outside use the nearest cell, at its face.
     #[inline]
     pub fn cell(&self, position: Vec3) -> Cell {

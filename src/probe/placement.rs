@@ -36,7 +36,7 @@ pub struct PlacementSettings {
     /// Rays that decide about one probe.
     pub rays: u32,
     /// A probe counts as inside geometry (or outside the world) when more than this share of what its rays meet are
-    /// backs of surfaces.
+    /// backs of surfaces. Beside a sheet that has only a front nearly half of them are.
     pub back_face_share: f32,
     /// Move probes that are inside geometry, or touch it, into the open where it is near.
     pub relocate: bool,
@@ -46,7 +46,7 @@ pub struct PlacementSettings {
 
 impl Default for PlacementSettings {
     fn default() -> Self {
-        PlacementSettings { rays: 128, back_face_share: 0.25, relocate: true, keep_unsampled: false }
+        PlacementSettings { rays: 128, back_face_share: 0.5, relocate: true, keep_unsampled: false }
     }
 }
 

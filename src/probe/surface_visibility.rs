@@ -76,6 +76,9 @@ pub struct Entry {
 /// border of two is known in both, on whichever side of it rounding puts the point that asks.
 const VOXEL_MARGIN: f32 = 0.03;
 
+/// Where the survey found no surface of this facing in a point's own voxel, one this many voxels away may stand in.
+const MISSED_REACH: u32 = 3;
+
 /// Points nearer to a voxel's border than this share of its side may use the voxel beyond.
 const STRIP: f32 = 0.25;
 
@@ -95,7 +98,7 @@ struct Tally {
 }
 
 impl SurfaceVisibility {
-    /// What a surface point sees. Everything where nothing is known.
+    /// What a surface point sees: everything where no surface is known, nothing where only others are.
     pub fn look_up(&self, grid: &Grid, position: Vec3, facing: Facing) -> Seen {
         let cell = grid.cell(position);
         let n = self.voxels_per_cell;
@@ -103,11 +106,15 @@ impl SurfaceVisibility {
         let first = self.cell_start[index] as usize;
         let keys = &self.keys[first..self.cell_start[index + 1] as usize];
         let wanted = key(voxel_of(cell.fraction, n), facing, n);
+        // The survey covers the grid's hull; beyond it the nearest surface of the rim has to do.
+        let surveyed = grid.is_within(position) && !keys.is_empty();
         let found = match keys.binary_search(&wanted) {
             Ok(found) => Some(found),
-            Err(_) => nearest_entry(keys, wanted, n),
+            Err(_) => nearest_entry(keys, wanted, n, if surveyed { MISSED_REACH } else { 2 * n }),
         };
-        let Some(found) = found else { return Seen { mask: u8::MAX, far: None } };
+        let Some(found) = found else {
+            return Seen { mask: if surveyed { 0 } else { u8::MAX }, far: None };
+        };
         let mask = self.masks[first + found];
         if mask != 0 {
             return Seen { mask, far: None };
@@ -250,8 +257,8 @@ impl Facing {
     }
 }
 
-/// The entry that faces the same way in the nearest voxel, else any in the same voxel.
-fn nearest_entry(keys: &[u16], wanted: u16, n: u32) -> Option<usize> {
+/// The entry that faces the same way in the nearest voxel, at most `reach` voxels away.
+fn nearest_entry(keys: &[u16], wanted: u16, n: u32, reach: u32) -> Option<usize> {
     let voxel = |key: u16| {
         let v = u32::from(key) / 6;
         UVec3::new(v % n, v / n % n, v / (n * n)).as_ivec3()
@@ -259,8 +266,10 @@ fn nearest_entry(keys: &[u16], wanted: u16, n: u32) -> Option<usize> {
     let target = voxel(wanted);
     (0..keys.len())
         .filter(|&i| keys[i] % 6 == wanted % 6)
-        .min_by_key(|&i| voxel(keys[i]).distance_squared(target))
-        .or_else(|| keys.iter().position(|k| k / 6 == wanted / 6))
+        .map(|i| (voxel(keys[i]).distance_squared(target), i))
+        .filter(|(distance_squared, _)| *distance_squared as u32 <= reach * reach)
+        .min()
+        .map(|(_, i)| i)
 }
 
 /// Bit i: whether corner i of the cell is an active probe.

@@ -127,9 +127,8 @@ fn a_lamp_alone() {
     let scene = save(gltf, &folder, "lamp");
     let files = seeds(&folder, &scene, &format!("{ABOVE} --set capture.probe_emitter_samples=4096"));
     check(&files, "lamp", |position, normals| {
-        let exact = |radiance: &f64| {
-            normals.iter().map(|n| radiance * irradiance_from_quad(position, *n, LAMP, 60)).collect()
-        };
+        let exact =
+            |radiance: &f64| normals.iter().map(|n| radiance * irradiance_from_quad(position, *n, LAMP, 60)).collect();
         RADIANCE.iter().map(exact).collect()
     });
     // Behind the lamp it is dark: only its front emits.

@@ -14,7 +14,8 @@ fn whole(folder: &Folder, words: &str) -> Vec<u8> {
     bake(folder, &scene("cornell"), &format!("--set grid.divisions=(3,3,3) {words}")).bytes
 }
 
-const MOMENTS: &str = "--set query.visibility={\"moments\":{\"power\":3,\"floor\":0}} --set filter.distance_resolution=4";
+const MOMENTS: &str =
+    "--set query.visibility={\"moments\":{\"power\":3,\"floor\":0}} --set filter.distance_resolution=4";
 
 fn is_refused(folder: &Folder, bytes: &[u8]) -> bool {
     file::read(&folder.write("damaged.probes", bytes)).is_err()
@@ -80,7 +81,8 @@ fn lying_headers() {
     let shape = format!(
         r#"{{"irradiance":{{"dtype":"F32","shape":[4294967295,4294967295,4294967295],"data_offsets":[0,{huge}]}}}}"#
     );
-    let overlapping = r#"{"a":{"dtype":"U8","shape":[4],"data_offsets":[0,4]},"b":{"dtype":"U8","shape":[4],"data_offsets":[2,6]}}"#;
+    let overlapping =
+        r#"{"a":{"dtype":"U8","shape":[4],"data_offsets":[0,4]},"b":{"dtype":"U8","shape":[4],"data_offsets":[2,6]}}"#;
     let negative = r#"{"a":{"dtype":"U8","shape":[4],"data_offsets":[4,0]}}"#;
     let deep = "[".repeat(100_000);
     for (length, header) in [
@@ -214,14 +216,16 @@ fn odd_visibility_keys_do_not_panic() {
         keys.bytes.iter_mut().enumerate().for_each(|(i, b)| *b = (i * 151) as u8);
     });
     let output = folder.path().join("out");
-    let run = crate::program::run(&["render", text(&scene("cornell")), text(&path), "-o", text(&output), "--size", "32x18"]);
+    let run =
+        crate::program::run(&["render", text(&scene("cornell")), text(&path), "-o", text(&output), "--size", "32x18"]);
     assert!(matches!(run.code, Some(0 | 2)), "{}", run.stderr);
 }
 
 #[test]
 fn files_that_are_no_probe_files() {
     let folder = Folder::new();
-    for (name, bytes) in [("empty.probes", &b""[..]), ("text.probes", b"not a probe file\n"), ("seven.probes", &[0; 7])] {
+    for (name, bytes) in [("empty.probes", &b""[..]), ("text.probes", b"not a probe file\n"), ("seven.probes", &[0; 7])]
+    {
         let message = refuse(&["inspect", text(&folder.write(name, bytes))]);
         assert!(message.contains(name), "{message}");
     }

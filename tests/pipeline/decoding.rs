@@ -82,8 +82,9 @@ fn every_encoding_decodes_outside_the_crate() {
                     for (a, b) in file.texels(probe).iter().zip(exact.texels(probe)) {
                         for c in 0..3 {
                             // The curve takes the fifth root: relative errors of stored values count five times.
-                            // And what is fed back through the probes differs a little with curve and border.
-                            let tolerance = (precision * power + 0.02) * b.2[c] + 1e-6;
+                            // What is fed back through the probes differs a little with curve and border; probes
+                            // outside the room hold next to nothing, some 1e-5 of what those inside hold (about 2).
+                            let tolerance = (precision * power + 0.02) * b.2[c] + 1e-4;
                             assert!((a.2[c] - b.2[c]).abs() <= tolerance, "{what}: {a:?} {b:?}");
                         }
                     }
@@ -204,8 +205,7 @@ fn extreme_light_survives_every_format() {
 
 #[test]
 fn python_opens_it() {
-    let importable =
-        Command::new("python3").args(["-c", "from safetensors.numpy import load_file"]).output();
+    let importable = Command::new("python3").args(["-c", "from safetensors.numpy import load_file"]).output();
     if !importable.is_ok_and(|o| o.status.success()) {
         eprintln!("SKIPPED: python3 has no safetensors.numpy; pip install safetensors numpy");
         return;

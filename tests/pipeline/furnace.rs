@@ -21,18 +21,29 @@ fn seeds(folder: &Folder, scene: &Path, words: &str, count: u32) -> Vec<ProbeFil
     (0..count).map(|seed| bake(folder, scene, &format!("{words} --seed {seed}")).file).collect()
 }
 
-/// Every given probe: mean within 0.5 %, texels within five standard errors and the solver's tolerance.
+/// Every given probe: mean within 0.5 % under every seed, texels within five standard errors and the solver's tolerance.
 fn check(files: &[ProbeFile], probes: &[usize], expected: [f64; 3], what: &str) {
-    assert!(!probes.is_empty(), "{what}: no probe");
     for file in files {
-        for &probe in probes {
-            let mean = file.mean_irradiance(probe);
-            for c in 0..3 {
-                let off = mean[c] / expected[c] - 1.0;
-                assert!(off.abs() < 0.005, "{what}, probe {probe}, channel {c}: off by {off}");
-            }
+        check_means(std::slice::from_ref(file), probes, expected, what);
+    }
+    check_texels(files, probes, expected, what);
+}
+
+/// Every given probe's mean over directions and files within 0.5 %.
+fn check_means(files: &[ProbeFile], probes: &[usize], expected: [f64; 3], what: &str) {
+    assert!(!probes.is_empty(), "{what}: no probe");
+    for &probe in probes {
+        let means: Vec<_> = files.iter().map(|f| f.mean_irradiance(probe)).collect();
+        for c in 0..3 {
+            let mean = means.iter().map(|m| m[c]).sum::<f64>() / files.len() as f64;
+            let off = mean / expected[c] - 1.0;
+            assert!(off.abs() < 0.005, "{what}, probe {probe}, channel {c}: off by {off}");
         }
     }
+}
+
+/// Texels' means over the files within five standard errors and the solver's tolerance.
+fn check_texels(files: &[ProbeFile], probes: &[usize], expected: [f64; 3], what: &str) {
     let largest = expected.iter().copied().fold(0.0, f64::max);
     for c in 0..3 {
         let samples = Samples::of(files, probes, c);
@@ -58,7 +69,8 @@ fn the_scene_of_the_repository() {
 #[test]
 fn probes_of_the_default_grid_within_the_room() {
     // The default grid also has probes outside the room, which see no light. They lower the share of directions in
-    // which emitters are seen, so that emitters are sampled and there is noise to test.
+    // which emitters are seen, so that emitters are sampled and there is noise to test: 0.33 % (rms) in the mean of a
+    // probe under one seed, so the 0.5 % is asked of the mean over twelve, where it is five standard errors.
     let folder = Folder::new();
     let files = seeds(&folder, &scene("furnace"), "--set encoding.irradiance=f32 --set grid.spacing_m=0.6", 12);
     let inside = |p: &usize| {
@@ -67,7 +79,8 @@ fn probes_of_the_default_grid_within_the_room() {
     };
     let probes: Vec<usize> = files[0].active().into_iter().filter(inside).collect();
     assert!(Samples::of(&files, &probes, 0).pooled_error() > 0.0, "no noise: this test would test nothing");
-    check(&files, &probes, expected([1.0; 3], [0.5; 3]), "furnace.glb, default grid");
+    check_means(&files, &probes, expected([1.0; 3], [0.5; 3]), "furnace.glb, default grid");
+    check_texels(&files, &probes, expected([1.0; 3], [0.5; 3]), "furnace.glb, default grid");
 }
 
 #[test]

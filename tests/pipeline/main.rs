@@ -4,9 +4,9 @@
 
 mod adversarial;
 mod closed_forms;
+mod command_line;
 #[path = "../common/mod.rs"]
 mod common;
-mod command_line;
 mod damage;
 mod decoding;
 mod determinism;

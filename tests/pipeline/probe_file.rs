@@ -131,8 +131,8 @@ impl ProbeFile {
         let share = [place[0] - low[0] as f64, place[1] - low[1] as f64];
         let mut sum = [0.0; 3];
         for (dy, dx) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            let weight = (if dx == 1 { share[0] } else { 1.0 - share[0] })
-                * (if dy == 1 { share[1] } else { 1.0 - share[1] });
+            let weight =
+                (if dx == 1 { share[0] } else { 1.0 - share[0] }) * (if dy == 1 { share[1] } else { 1.0 - share[1] });
             let texel = self.stored(probe, (low[1] + dy).min(side - 1), (low[0] + dx).min(side - 1));
             sum = std::array::from_fn(|i| sum[i] + weight * texel[i]);
         }

@@ -289,3 +289,13 @@ fn grids_of_one_probe_and_of_one_layer_can_be_read_back() {
         render(&folder, &scene("furnace"), &baked.path, "run", "--size 16x9");
     }
 }
+
+/// A box without extent leaves no spacing to derive from it; the file must be readable all the same, or not be written.
+#[test]
+fn a_grid_of_one_point_can_be_read_back() {
+    let folder = Folder::new();
+    let point = "--set grid.divisions=(1,1,1) --set grid.bounds={\"min\":[0,1,0],\"max\":[0,1,0]}";
+    let baked = bake(&folder, &scene("furnace"), point);
+    succeed(&["inspect", text(&baked.path)]);
+    render(&folder, &scene("furnace"), &baked.path, "run", "--size 16x9");
+}

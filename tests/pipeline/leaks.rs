@@ -84,3 +84,17 @@ fn a_wall_of_a_millimetre_is_a_wall() {
     assert!(mean(&folder, "behind_solid", "visibility_off") > 0.03 * lit);
     assert!(mean(&folder, "behind_solid", "visibility_on") <= 0.001 * lit);
 }
+
+/// Points behind the sheet that see none of their probes (those behind it count as inside geometry) must not be lit by
+/// the probes before it either.
+#[test]
+fn a_single_sheet_is_a_wall_from_behind_too() {
+    let folder = Folder::new();
+    let baked = bake(&folder, &scene("thin_wall"), SPACING);
+    for camera in ["middle", "behind_sheet"] {
+        view(&folder, "thin_wall", &baked, camera);
+    }
+    let (on, exact) = (mean(&folder, "behind_sheet", "visibility_on"), mean(&folder, "behind_sheet", "visibility_ray"));
+    let lit = mean(&folder, "middle", "visibility_on");
+    assert!(on <= 0.001 * lit, "{on} behind the sheet with visibility, {exact} with exact visibility, {lit} before it");
+}

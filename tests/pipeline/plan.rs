@@ -88,3 +88,11 @@ fn a_room_without_anything_in_the_way_has_no_visibility() {
         check(&scene, &format!("{inside} {visibility}"), "");
     }
 }
+
+/// The share of directions in which emitters are seen divides the samples: probes that only the full bake keeps must
+/// not change it for the others.
+#[test]
+fn courtyard_under_a_sky() {
+    let words = "--set grid.spacing_m=4 --set solver.max_bounces=3 --set capture.resolution=16 --env 0.3,0.5,0.8";
+    check(&scene("courtyard"), words, "--env 0.3,0.5,0.8");
+}

@@ -110,7 +110,9 @@ impl Grid {
                 if divisions.0 == 0 || divisions.1 == 0 || divisions.2 == 0 {
                     return Err(GridError::Divisions(divisions));
                 }
-                spread(high - low, UVec3::from(divisions), padding)
+                let (low_scene, high_scene) = scene_bounds(scene);
+                let usual = (high_scene - low_scene).max_element() / DEFAULT_CELLS;
+                spread(high - low, UVec3::from(divisions), padding, usual)
             }
             (Some(spacing), None) => {
                 if !(spacing > 0.0 && spacing.is_finite()) {
@@ -236,12 +238,12 @@ fn cover(extent: DVec3, spacing: f64, padding: f64) -> Result<(DVec3, UVec3), Gr
     Ok((DVec3::splat(spacing), cells.as_uvec3() + UVec3::ONE))
 }
 
-/// The spacing at which so many probes cover the extent and the padding.
-fn spread(extent: DVec3, divisions: UVec3, padding: f64) -> (DVec3, UVec3) {
+/// The spacing at which so many probes cover the extent and the padding; `usual` where there is no extent.
+fn spread(extent: DVec3, divisions: UVec3, padding: f64, usual: f64) -> (DVec3, UVec3) {
     let cells = (divisions - UVec3::ONE).as_dvec3();
     let room = (cells - 2.0 * padding).max(DVec3::splat(0.5));
     // A single layer needs a spacing too, for what is measured in spacings; so do axes along which the scene is flat.
     let layered = DVec3::select(divisions.cmpgt(UVec3::ONE), extent / room, extent);
-    let fallback = layered.max_element().max(f64::MIN_POSITIVE);
+    let fallback = if layered.max_element() > 0.0 { layered.max_element() } else { usual };
     (DVec3::select(layered.cmpgt(DVec3::splat(fallback * 1e-6)), layered, DVec3::splat(fallback)), divisions)
 }

@@ -54,7 +54,7 @@ pub fn relocate(settler: &Settler, grid: &Grid, placement: &mut Placement, surve
     let table = &survey.table;
     // A probe under the floor may see the floor's back; no one else does.
     let seen = seen_probes(grid, placement, table, |entry| survey.fronts[entry]);
-    let idle = |probe: usize| !seen[probe] && placement.states[probe] != ProbeState::NeverSampled;
+    let idle = |probe: usize| !seen[probe] && placement.sampled[probe];
     let needs_of_cell = |cell: usize| -> Vec<Need> {
         if !(0..8).any(|i| idle(grid.corner(grid.cell_base(cell), i).0 as usize)) {
             return Vec::new();

@@ -56,6 +56,8 @@ pub struct Placement {
     pub states: Vec<ProbeState>,
     /// After relocation, relative to the scene's origin, metres.
     pub positions: Vec<Vec3>,
+    /// Whether any surface lies in the probe's cells.
+    pub sampled: Vec<bool>,
     /// Probes moved from their grid points.
     pub relocated: usize,
     /// Share of the active probes' rays that end on an emitting surface or in the sky.
@@ -65,17 +67,13 @@ pub struct Placement {
 
 /// Classifies every probe of the grid. `reach` is how far from a surface, in spacings, it may look probes up.
 pub fn place(world: &World, grid: &Grid, settings: &PlacementSettings, reach: f32) -> Placement {
-    let sampled = if settings.keep_unsampled {
-        vec![true; grid.probe_count()]
-    } else {
-        sampled_probes(grid, &world.scene.mesh, reach)
-    };
+    let sampled = sampled_probes(grid, &world.scene.mesh, reach);
     let settler = Settler { world, settings, spacing_m: grid.spacing.min_element() };
     let found: Vec<(ProbeState, Vec3, Surroundings)> = (0..grid.probe_count())
         .into_par_iter()
         .map(|probe| {
             let position = grid.origin + grid.position_in_grid(super::ProbeIndex(probe as u32));
-            if sampled[probe] {
+            if sampled[probe] || settings.keep_unsampled {
                 settler.settle(position)
             } else {
                 (ProbeState::NeverSampled, position, Surroundings::default())
@@ -83,14 +81,17 @@ pub fn place(world: &World, grid: &Grid, settings: &PlacementSettings, reach: f3
         })
         .collect();
     let active = || found.iter().filter(|f| f.0 == ProbeState::Active);
-    let seen: u64 = active().map(|f| f.2.rays).sum();
-    let emitting: u64 = active().map(|f| f.2.emitting).sum();
+    // Of those that matter only: keeping the others must not change how samples are divided.
+    let counted = || found.iter().zip(&sampled).filter(|(f, sampled)| **sampled && f.0 == ProbeState::Active);
+    let seen: u64 = counted().map(|(f, _)| f.2.rays).sum();
+    let emitting: u64 = counted().map(|(f, _)| f.2.emitting).sum();
     Placement {
         relocated: active().filter(|f| f.2.relocated).count(),
         emitter_coverage: if seen > 0 { emitting as f32 / seen as f32 } else { 0.0 },
         rays: found.iter().map(|f| f.2.total_rays).sum(),
         states: found.iter().map(|f| f.0).collect(),
         positions: found.iter().map(|f| f.1).collect(),
+        sampled,
     }
 }
 

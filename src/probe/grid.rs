@@ -151,6 +151,12 @@ impl Grid {
         base.x + n.x * (base.y + n.y * base.z)
     }
 
+    /// Inverse of [`Self::cell_index`].
+    pub fn cell_base(&self, index: usize) -> UVec3 {
+        let n = self.cells().as_usizevec3();
+        UVec3::new((index % n.x) as u32, (index / n.x % n.y) as u32, (index / (n.x * n.y)) as u32)
+    }
+
     pub fn coordinate(&self, probe: ProbeIndex) -> UVec3 {
         let (nx, ny) = (self.divisions.x, self.divisions.y);
         UVec3::new(probe.0 % nx, probe.0 / nx % ny, probe.0 / (nx * ny))

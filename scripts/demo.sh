@@ -6,24 +6,14 @@ source "$(dirname -- "${BASH_SOURCE[0]}")/lib.sh"
 
 only_help "usage: scripts/demo.sh
 
-Sets up (scripts/setup.sh), builds, bakes scenes/two_rooms_sealed.glb and renders both its cameras to out/demo/." "$@"
+Sets up (scripts/setup.sh), builds, bakes scenes/two_rooms_sealed.glb and renders both its cameras to out/demo/.
+LIGHTPROBE names a binary to use instead of building one." "$@"
 
-bash scripts/setup.sh
-ensure_cargo
+provide_lightprobe
 
 scene=scenes/two_rooms_sealed.glb
 probes=out/demo/two_rooms_sealed.probes
 cameras=(lit dark)
-
-# cargo says where the binary is, whatever CARGO_TARGET_DIR and its configuration make of it.
-build() {
-    cargo build --locked --release --bin lightprobe --message-format=json-render-diagnostics |
-        sed -n 's/.*"executable":"\([^"]*\)".*/\1/p' | tail -n 1
-}
-
-say 'building (the first time takes minutes)'
-lightprobe=$(build) || die 'the build failed; cargo says above why'
-[[ -x $lightprobe ]] || die "cargo built no lightprobe ('$lightprobe')"
 
 mkdir -p out/demo
 "$lightprobe" bake "$scene" --config configs/scenes/two_rooms_sealed.ron -o "$probes" --report out/demo/bake.json

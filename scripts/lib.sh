@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# Shared by setup.sh, test.sh and demo.sh: messages, and a usable environment even when none was given.
+# Shared by all scripts here: messages, and a usable environment even when none was given.
 # Sourced, never run. Sets `root` (the checkout) and makes it the current folder.
 
 set -euo pipefail
@@ -83,10 +83,26 @@ ensure_cargo() {
     ensure_cargo_home
 }
 
+# Sets `lightprobe`: the binary that LIGHTPROBE names, else a release build of this checkout, with set-up first.
+provide_lightprobe() {
+    if [[ -n ${LIGHTPROBE-} ]]; then
+        lightprobe=$LIGHTPROBE
+        [[ -x $lightprobe ]] || die "LIGHTPROBE=$LIGHTPROBE is no program: correct or unset it"
+        return
+    fi
+    bash scripts/setup.sh
+    ensure_cargo
+    say 'building (the first time takes minutes)'
+    # cargo says where the binary is, whatever CARGO_TARGET_DIR and its configuration make of it.
+    lightprobe=$(cargo build --locked --release --bin lightprobe --message-format=json-render-diagnostics |
+        sed -n 's/.*"executable":"\([^"]*\)".*/\1/p' | tail -n 1) || die 'the build failed; cargo says above why'
+    [[ -x $lightprobe ]] || die "cargo built no lightprobe ('$lightprobe')"
+}
+
 # Relative folders in variables mean the caller's folder, which we are about to leave.
 anchor_folders() {
     local name
-    for name in CARGO_TARGET_DIR EMBREE_DIR LIBCLANG_PATH; do
+    for name in CARGO_TARGET_DIR EMBREE_DIR LIBCLANG_PATH LIGHTPROBE; do
         case ${!name-} in
             '' | /*) ;;
             *) export "$name=$PWD/${!name}" ;;

@@ -2,7 +2,8 @@
 //!
 //! `bake` runs it once; whatever compares configurations runs it many times on one [`World`].
 
-use std::time::Instant;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 use glam::Vec2;
 use rayon::prelude::*;
@@ -11,16 +12,18 @@ use crate::config::{Config, PlanMode};
 use crate::light::World;
 use crate::plan::Plan;
 use crate::probe::capture::{Capture, EmissionTransport, ProbeCapture};
-use crate::probe::container::Container;
+use crate::probe::checkpoint;
+use crate::probe::container::{Container, FileError};
 use crate::probe::file::{self, EncodingLosses, SceneRecord};
 use crate::probe::filter::Kernel;
 use crate::probe::grid::GridError;
 use crate::probe::map::{OctahedralMaps, fill_with_border};
-use crate::probe::placement::{Placement, ProbeState, place};
+use crate::probe::need;
+use crate::probe::placement::{Placement, ProbeState, Settler, place};
 use crate::probe::query::VisibilitySettings;
 use crate::probe::solver::{Captures, Solution, Solver};
 use crate::probe::surface_visibility::SurfaceVisibility;
-use crate::probe::{Grid, ProbeIndex, Volume};
+use crate::probe::{Grid, Volume};
 use crate::progress::Progress;
 use crate::report::bake::{Numerics, Rays, Times};
 
@@ -34,12 +37,27 @@ const SURVEY_VOXELS: u32 = 4;
 const REPLAY_CHUNK: usize = 256;
 
 /// One bake's circumstances that are not part of the method.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Circumstances {
     pub seed: u64,
     /// Most bytes of captures kept in memory; the rest is traced again for every bounce, with the same result.
     pub memory_budget_bytes: Option<u64>,
     pub progress: Progress,
+    /// Where sweeps are saved while a long bake runs, and whether to go on from there.
+    pub checkpoint: Option<Checkpoint>,
+}
+
+#[derive(Debug, Clone)]
+pub struct Checkpoint {
+    pub path: PathBuf,
+    pub resume: bool,
+    /// Least time between two checkpoints.
+    pub interval: Duration,
+}
+
+impl Checkpoint {
+    /// Short bakes write none.
+    pub const INTERVAL: Duration = Duration::from_secs(10);
 }
 
 /// Everything decided before tracing the captures.
@@ -80,22 +98,41 @@ pub fn prepare<'w, 's>(
     let mut placement_settings = config.placement.clone();
     placement_settings.keep_unsampled |= config.plan == PlanMode::KeepEverything;
     let bar = circumstances.progress.stage("placing", 1);
-    let placement = place(world, &grid, &placement_settings, config.query.reach());
+    let mut placement = place(world, &grid, &placement_settings, config.query.reach());
+    bar.set_prefix("surveying");
+    let mut survey_rays = placement.rays;
     let voxels = match config.query.visibility {
         VisibilitySettings::None => None,
         VisibilitySettings::Moments { .. } => Some(SURVEY_VOXELS),
         VisibilitySettings::Surface { voxels_per_cell } => Some(voxels_per_cell),
     };
-    bar.set_prefix("surveying");
-    let positions = positions(&grid);
-    let mut survey_rays = placement.rays;
-    let surface = voxels.map(|voxels| {
-        let seed = circumstances.seed;
-        let (table, rays) =
-            SurfaceVisibility::measure(world.scene, &world.tracer, &grid, &placement.states, &positions, voxels, seed);
-        survey_rays += rays;
-        table
-    });
+    let mut survey = |placement: &Placement| {
+        voxels.map(|voxels| {
+            let (states, positions) = (&placement.states, &placement.positions);
+            let seed = circumstances.seed;
+            let measured =
+                SurfaceVisibility::measure(world.scene, &world.tracer, &grid, states, positions, voxels, seed);
+            survey_rays += measured.rays;
+            measured
+        })
+    };
+    let mut surface = survey(&placement);
+    if let Some(measured) = &surface {
+        let settler = Settler { world, settings: &placement_settings, spacing_m: grid.spacing.min_element() };
+        if placement_settings.relocate && need::relocate(&settler, &grid, &mut placement, measured) > 0 {
+            surface = survey(&placement);
+        }
+    }
+    let mut surface = surface.map(|measured| measured.table);
+    if let (Some(table), VisibilitySettings::Surface { .. }) = (&mut surface, config.query.visibility) {
+        table.far = need::far_probes(&world.tracer, &grid, &placement, table);
+    }
+    // Only where shading asks this very table does a probe that no surface sees weigh nothing.
+    if let (Some(table), VisibilitySettings::Surface { .. }) = (&surface, config.query.visibility)
+        && !placement_settings.keep_unsampled
+    {
+        retire_unseen(&grid, &mut placement, table);
+    }
     bar.finish_and_clear();
     let plan = Plan::new(world, config, &grid, &placement, surface.as_ref());
     let survey_s = started.elapsed().as_secs_f64();
@@ -103,9 +140,15 @@ pub fn prepare<'w, 's>(
     Ok(Prepared { world, config, grid, placement, surface, plan, survey_rays, survey_s, hull })
 }
 
-/// Positions of all probes relative to the scene's origin.
-fn positions(grid: &Grid) -> Vec<glam::Vec3> {
-    (0..grid.probe_count() as u32).map(|p| grid.origin + grid.position_in_grid(ProbeIndex(p))).collect()
+/// Active probes that no surface sees are not worth baking.
+fn retire_unseen(grid: &Grid, placement: &mut Placement, table: &SurfaceVisibility) {
+    let mut seen = need::seen_probes(grid, placement, table, |_| true);
+    table.far.iter().for_each(|&(_, probe)| seen[probe as usize] = true);
+    for (state, seen) in placement.states.iter_mut().zip(seen) {
+        if *state == ProbeState::Active && !seen {
+            *state = ProbeState::NeverSampled;
+        }
+    }
 }
 
 /// Captures in memory as far as the budget goes; the others are traced again whenever they are asked for.
@@ -143,7 +186,7 @@ impl Prepared<'_, '_> {
 
     /// Traces one active probe.
     fn trace(&self, capture: &Capture, probe: usize) -> ProbeCapture {
-        let position = self.grid.origin + self.grid.position_in_grid(ProbeIndex(probe as u32));
+        let position = self.placement.positions[probe];
         let (low, high) = self.hull;
         capture.probe(probe, position, |p| p.cmpge(low).all() && p.cmple(high).all())
     }
@@ -185,7 +228,7 @@ impl Prepared<'_, '_> {
     }
 
     /// Runs the rest of the pipeline. `load` and `accel_build` times are the caller's to fill.
-    pub fn bake(mut self, circumstances: &Circumstances, scene: &SceneRecord) -> Baked {
+    pub fn bake(mut self, circumstances: &Circumstances, scene: &SceneRecord) -> Result<Baked, FileError> {
         let config = self.config;
         let (filter, encoding) = (&config.filter, &config.encoding);
         let probes = self.grid.probe_count();
@@ -193,6 +236,7 @@ impl Prepared<'_, '_> {
         let mut numerics = Numerics {
             probes_inside_geometry: count(&self.placement, ProbeState::InsideGeometry),
             dropped_triangles: self.world.scene.dropped.total(),
+            albedo_clamped: self.world.clamped_materials(),
             ..Default::default()
         };
         let mut rays = Rays { survey: self.survey_rays, ..Default::default() };
@@ -208,7 +252,7 @@ impl Prepared<'_, '_> {
         let is_surface = matches!(config.query.visibility, VisibilitySettings::Surface { .. });
         let surface_bytes = self.surface.as_ref().filter(|_| is_surface).map_or(0, SurfaceVisibility::bytes);
         let mut volume = Volume {
-            positions: positions(&self.grid),
+            positions: self.placement.positions.clone(),
             states: self.placement.states.clone(),
             irradiance: OctahedralMaps::new(probes, filter.irradiance_resolution, encoding.border, glam::Vec3A::ZERO),
             curve: encoding.curve,
@@ -228,11 +272,29 @@ impl Prepared<'_, '_> {
             settings: &config.solver,
             gathers_emission: config.capture.emission == EmissionTransport::Gathered,
         };
-        let solution = solver.solve(&mut volume, |bounce| {
-            bar.inc(1);
-            bar.set_message(format!("residual {:.1e}", bounce.residual));
+        let identity = format!("{} seed {} {}", scene.blake3, circumstances.seed, config.to_ron());
+        let mut progress = Solution::default();
+        if let Some(Checkpoint { path, resume: true, .. }) = &circumstances.checkpoint
+            && path.exists()
+        {
+            progress = checkpoint::read(path, &identity, &mut volume)?;
+        }
+        let mut saved = Ok(());
+        let mut last_saved = Instant::now();
+        let solution = solver.solve(&mut volume, progress, |progress, volume| {
+            bar.set_position(progress.bounces.len() as u64);
+            let residual = progress.bounces.last().map_or(0.0, |b| b.residual);
+            bar.set_message(format!("residual {residual:.1e}"));
+            if let Some(Checkpoint { path, interval, .. }) = &circumstances.checkpoint
+                && last_saved.elapsed() >= *interval
+                && saved.is_ok()
+            {
+                saved = checkpoint::write(path, &identity, progress, volume);
+                last_saved = Instant::now();
+            }
         });
         bar.finish_and_clear();
+        saved?;
         times.bounces = started.elapsed().as_secs_f64();
         numerics.non_finite += solution.non_finite;
         let done = solution.bounces.len().saturating_sub(1) as u32;
@@ -251,7 +313,7 @@ impl Prepared<'_, '_> {
         times.encode = started.elapsed().as_secs_f64();
         numerics.clamped = losses.clamped.clone();
         numerics.variance_floor_hits = losses.variance_floor_hits;
-        Baked { volume, container, losses, solution, plan, rays, times, numerics, surface_bytes }
+        Ok(Baked { volume, container, losses, solution, plan, rays, times, numerics, surface_bytes })
     }
 
     /// Whether the method has distance maps and the plan or the configuration keeps them.
@@ -319,4 +381,53 @@ impl Prepared<'_, '_> {
 
 fn count(placement: &Placement, state: ProbeState) -> usize {
     placement.states.iter().filter(|&&s| s == state).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{self, LoadOptions};
+
+    /// Bakes the open rooms coarsely.
+    fn bake(checkpoint: Option<Checkpoint>, max_bounces: u32) -> Baked {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/two_rooms_open.glb");
+        let scene = scene::load(&path, &LoadOptions::default()).unwrap();
+        let set = ["grid.spacing_m=2".to_owned(), format!("solver.max_bounces={max_bounces}")];
+        let config = Config::default().with_overrides(&set).unwrap();
+        let world = World::new(&scene, config.lights.punctual_scale, config.solver.albedo_max).unwrap();
+        let circumstances =
+            Circumstances { seed: 1, memory_budget_bytes: None, progress: Progress::hidden(), checkpoint };
+        let record = SceneRecord { name: scene.name.clone(), blake3: scene.blake3.clone() };
+        prepare(&world, &config, &circumstances).unwrap().bake(&circumstances, &record).unwrap()
+    }
+
+    #[test]
+    fn a_resumed_bake_gives_the_same_bytes() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.resume");
+        let checkpoint = |resume| Checkpoint { path: path.clone(), resume, interval: Duration::ZERO };
+        let whole = bake(None, 64);
+        assert!(!path.exists());
+        // With an interval of zero every sweep is saved; the last stands.
+        bake(Some(checkpoint(false)), 64);
+        let saved = std::fs::read(&path).unwrap();
+        let resumed = bake(Some(checkpoint(true)), 64);
+        assert_eq!(std::fs::read(&path).unwrap(), saved, "nothing was left to sweep");
+        assert_eq!(resumed.container, whole.container);
+        assert_eq!(resumed.solution, whole.solution);
+    }
+
+    #[test]
+    fn a_bake_is_resumed_from_the_middle() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.resume");
+        let checkpoint = |resume| Checkpoint { path: path.clone(), resume, interval: Duration::ZERO };
+        bake(Some(checkpoint(false)), 3);
+        // The checkpoint of a bake with other settings, relabelled as one of this: three sweeps done, the rest to do.
+        let mut container = Container::read(&path).unwrap();
+        let identity = container.metadata["identity"].replace("max_bounces: 3", "max_bounces: 64");
+        container.metadata.insert("identity".into(), identity);
+        container.write(&path).unwrap();
+        assert_eq!(bake(Some(checkpoint(true)), 64).container, bake(None, 64).container);
+    }
 }

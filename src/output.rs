@@ -68,6 +68,21 @@ pub fn write_atomically(
     written.map_err(|cause| output_error(path, folder, cause))
 }
 
+/// Refuses paths that [`write_atomically`] will not be able to write: no folder, or something there that is no file.
+///
+/// # Errors
+/// As those of writing.
+pub fn check_writable(path: &Path) -> Result<(), OutputError> {
+    let folder = folder_of(path);
+    if !folder.is_dir() {
+        return Err(OutputError::NoFolder { path: path.to_owned(), folder: folder.to_owned() });
+    }
+    if fs::metadata(path).is_ok_and(|existing| !existing.is_file()) {
+        return Err(OutputError::NotAFile { path: path.to_owned() });
+    }
+    Ok(())
+}
+
 /// Creates `path` and the folders above it where they are missing.
 ///
 /// # Errors

@@ -6,17 +6,19 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 
 use super::{Console, load_scene, peak_memory_bytes, set_threads, write_json};
-use crate::bake::{Baked, Circumstances, Prepared, prepare};
+use crate::bake::{Baked, Checkpoint, Circumstances, Prepared, prepare};
 use crate::cli::BakeArgs;
 use crate::config::{Config, presets};
 use crate::light::World;
+use crate::output::check_writable;
 use crate::plan::Line;
+use crate::probe::checkpoint;
 use crate::probe::file::SceneRecord;
 use crate::probe::layout;
 use crate::report::bake::{BakeReport, BytesPerProbe, SCHEMA};
 use crate::report::format;
 use crate::report::table::{Column, Table};
-use crate::scene::Scene;
+use crate::scene::{EnvironmentSource, Scene};
 
 pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     if args.preset.as_deref() == Some("list") {
@@ -28,7 +30,10 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     }
     let path = args.scene.as_deref().context("no scene: give a .glb or .gltf file")?;
     if !args.dry_run {
-        args.output.as_ref().context("no output: give -o OUT.probes")?;
+        let output = args.output.as_ref().context("no output: give -o OUT.probes")?;
+        // Said now rather than after an hour's bake.
+        check_writable(output)?;
+        args.report.as_deref().map_or(Ok(()), check_writable)?;
     }
     let threads = set_threads(args.trace.threads)?;
 
@@ -38,25 +43,42 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     let accel_started = Instant::now();
     let world = World::new(&scene, config.lights.punctual_scale, config.solver.albedo_max)?;
     let accel_build_s = accel_started.elapsed().as_secs_f64();
-    warn_if_dark(&world, path, console);
 
-    let circumstances =
-        Circumstances { seed: args.trace.seed, memory_budget_bytes: args.memory_budget, progress: console.progress };
+    let circumstances = Circumstances {
+        seed: args.trace.seed,
+        memory_budget_bytes: args.memory_budget,
+        progress: console.progress,
+        checkpoint: args.output.as_ref().map(|output| Checkpoint {
+            path: checkpoint::path_for(output),
+            resume: args.resume,
+            interval: Checkpoint::INTERVAL,
+        }),
+    };
+    if let Some(Checkpoint { path, resume: true, .. }) = &circumstances.checkpoint
+        && !path.exists()
+    {
+        console.warn(format!("--resume: there is no {}; starting anew", path.display()));
+    }
     let prepared = prepare(&world, &config, &circumstances)?;
     if args.dry_run {
         return dry_run(&prepared, &circumstances, console);
     }
+    let raw_started = Instant::now();
     let raw = args.measure_raw.then(|| prepared.raw_rays_per_s(&circumstances)).flatten();
+    let raw_s = raw_started.elapsed().as_secs_f64();
     let record = SceneRecord { name: scene.name.clone(), blake3: scene.blake3.clone() };
-    let mut baked = prepared.bake(&circumstances, &record);
+    let mut baked = prepared.bake(&circumstances, &record)?;
 
     let Some(output) = &args.output else { return Ok(()) };
     let write_started = Instant::now();
     let file_bytes = baked.container.write(output)?;
+    // The result stands: what it could have been resumed from is of no more use.
+    let _ = std::fs::remove_file(checkpoint::path_for(output));
     baked.times.write = write_started.elapsed().as_secs_f64();
     baked.times.load = load_s;
     baked.times.accel_build = accel_build_s;
-    baked.times.total = started.elapsed().as_secs_f64();
+    // The measurement is no part of the bake.
+    baked.times.total = started.elapsed().as_secs_f64() - raw_s;
 
     let report = report(&baked, &config, &scene, args.trace.seed, threads, file_bytes, raw);
     warn_about(&report, console);
@@ -74,23 +96,21 @@ fn list_presets(console: &Console) -> Result<()> {
     console.print(&lines.join("\n"))
 }
 
-/// Defaults, then preset or file, then `--set`.
+/// Defaults, then preset or file, then `--set`, then a constant `--env`, which the probe file so carries to `render`.
 fn resolve_config(args: &BakeArgs) -> Result<Config> {
-    let config = match (&args.config, &args.preset) {
+    let mut config = match (&args.config, &args.preset) {
         (Some(path), _) => Config::load(path)?,
         (None, Some(name)) => presets::find(name)?,
         (None, None) => Config::default(),
     };
-    Ok(config.with_overrides(&args.set)?)
-}
-
-fn warn_if_dark(world: &World, path: &Path, console: &Console) {
-    if world.scene.lights.is_empty() && !world.has_emitters() {
-        console.warn(format!(
-            "{}: the scene holds no light and everything will be black; give it a sky with --env R,G,B or --env FILE.hdr",
-            path.display()
-        ));
+    config = config.with_overrides(&args.set)?;
+    match &args.trace.env {
+        Some(EnvironmentSource::Constant(sky)) => config.lights.sky = Some((*sky).into()),
+        // A map replaces the configured sky; its path has no place in the file.
+        Some(EnvironmentSource::File(_)) => config.lights.sky = None,
+        None => {}
     }
+    Ok(config)
 }
 
 fn dry_run(prepared: &Prepared, circumstances: &Circumstances, console: &Console) -> Result<()> {
@@ -192,8 +212,8 @@ fn warn_about(report: &BakeReport, console: &Console) {
         console.warn(format!("{} values were not finite and count as zero", numerics.non_finite));
     }
     if numerics.albedo_clamped > 0 {
-        console.warn(format!(
-            "{} material(s) have an albedo above solver.albedo_max and are clamped to it",
+        console.say(format!(
+            "{} material(s) reach an albedo above solver.albedo_max and are clamped to it",
             numerics.albedo_clamped
         ));
     }

@@ -80,15 +80,6 @@ fn load_scene(path: &Path, trace: &TraceArgs, config: &Config, console: &Console
     for warning in &scene.warnings {
         console.warn(warning);
     }
-    if scene.dropped.total() > 0 {
-        let d = scene.dropped;
-        console.warn(format!(
-            "{}: dropped {} triangle(s) without area and {} with coordinates that are not finite",
-            path.display(),
-            d.zero_area,
-            d.non_finite
-        ));
-    }
     Ok(scene)
 }
 

@@ -166,7 +166,7 @@ fn cameras(args: &RenderArgs, world: &World, console: &Console) -> Result<Vec<Ca
             Some(camera) => camera.clone(),
             None => {
                 let bounds = scene.mesh.bounds().unwrap_or((Vec3::NEG_ONE, Vec3::ONE));
-                let (camera, inside) = frame(&world.tracer, bounds);
+                let (camera, inside) = frame(world, bounds);
                 let from = if inside { "from inside" } else { "from outside" };
                 console.warn(format!("the scene has no camera: framed it {from}; use --look-at for another view"));
                 camera

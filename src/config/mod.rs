@@ -79,8 +79,7 @@ pub enum ConfigError {
 impl Config {
     /// Reads RON text; `place` names it in errors.
     pub fn parse(text: &str, place: &str) -> Result<Config, ConfigError> {
-        let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME);
-        let config: Config = options.from_str(text).map_err(|e| ConfigError::Invalid {
+        let config: Config = ron_options().from_str(text).map_err(|e| ConfigError::Invalid {
             place: format!("{place}, line {} column {}", e.span.start.line, e.span.start.col),
             what: describe(&e.code),
         })?;
@@ -193,6 +192,11 @@ impl Config {
         }
         first_error
     }
+}
+
+/// RON in which optional values are written without `Some`.
+fn ron_options() -> ron::Options {
+    ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME)
 }
 
 const SIZE_RULE: &str = "use 1 to 1024 texels";

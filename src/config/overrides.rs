@@ -4,8 +4,8 @@ use serde_json::Value;
 
 use super::{Config, ConfigError, unknown_key};
 
-/// Applies `key=value` assignments in order. Values are RON or JSON as far as the two agree: numbers, `true`, names
-/// of choices (`f32`), lists in round or square brackets, and `{"choice": {"key": 1}}` for choices with keys.
+/// Applies `key=value` assignments in order. Values are RON as in a configuration file, for example `0.5`, `f32`,
+/// `(3, 4, 5)` or `surface(voxels_per_cell: 4)`.
 pub fn apply(config: Config, assignments: &[String]) -> Result<Config, ConfigError> {
     // Plain records of numbers and enums: nothing in them can fail to serialise.
     let mut tree = serde_json::to_value(&config).unwrap_or_default();
@@ -14,7 +14,13 @@ pub fn apply(config: Config, assignments: &[String]) -> Result<Config, ConfigErr
         let (path, value) = assignment
             .split_once('=')
             .ok_or_else(|| error("write it as key=value, for example grid.spacing_m=0.5".into()))?;
-        set(&mut tree, path.trim(), parse(value.trim())).map_err(error)?;
+        let (path, value) = (path.trim(), value.trim());
+        let parsed = match from_ron(path, value) {
+            Some(parsed) => parsed,
+            // Paths into a choice (`query.visibility.moments.power`), and mistakes, which get their message below.
+            None => plain(value),
+        };
+        set(&mut tree, path, parsed).map_err(error)?;
         // Checked one by one, so that the message names the assignment that does not fit.
         serde_json::from_value::<Config>(tree.clone()).map_err(|e| error(e.to_string()))?;
     }
@@ -37,13 +43,18 @@ fn set(tree: &mut Value, path: &str, value: Value) -> Result<(), String> {
     Ok(())
 }
 
-fn parse(text: &str) -> Value {
-    let bracketed = text.strip_prefix('(').and_then(|t| t.strip_suffix(')')).map(|inner| format!("[{inner}]"));
-    match (text, bracketed) {
-        ("None", _) => Value::Null,
-        (_, Some(list)) => serde_json::from_str(&list).unwrap_or_else(|_| Value::String(text.to_owned())),
-        _ => serde_json::from_str(text).unwrap_or_else(|_| Value::String(text.to_owned())),
-    }
+/// The value as a configuration file with nothing but this key would have it.
+fn from_ron(path: &str, value: &str) -> Option<Value> {
+    let keys: Vec<&str> = path.split('.').collect();
+    let text = keys.iter().rev().fold(value.to_owned(), |inner, key| format!("({key}: {inner})"));
+    let config: Config = super::ron_options().from_str(&text).ok()?;
+    let tree = serde_json::to_value(config).ok()?;
+    keys.iter().try_fold(&tree, |node, key| node.get(key)).cloned()
+}
+
+/// A number, `true`, JSON, or else the name of a choice.
+fn plain(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|_| Value::String(text.to_owned()))
 }
 
 #[cfg(test)]
@@ -62,7 +73,7 @@ mod tests {
             "grid.divisions=(3,4,5)",
             "encoding.irradiance=f32",
             "solver.tolerance=1e-3",
-            r#"query.visibility={"moments": {"power": 3, "floor": 0.05}}"#,
+            "query.visibility=moments(power: 3, floor: 0.05)",
             "query.visibility.moments.power=2",
         ])
         .unwrap();

@@ -6,7 +6,7 @@ pub mod punctual;
 pub mod sampled;
 pub mod surface;
 
-use crate::scene::Scene;
+use crate::scene::{Material, Scene};
 use crate::trace::{TraceError, Tracer};
 use emitters::Emitters;
 use surface::SurfaceTable;
@@ -34,6 +34,13 @@ impl<'s> World<'s> {
             punctual_scale,
             albedo_max,
         })
+    }
+
+    /// Materials whose albedo can exceed [`World::albedo_max`] by their factors.
+    pub fn clamped_materials(&self) -> u64 {
+        let exceeds =
+            |m: &&Material| !m.unlit && (m.base_color.truncate() * (1.0 - m.metallic)).max_element() > self.albedo_max;
+        self.scene.materials.iter().filter(exceeds).count() as u64
     }
 
     /// Whether anything but punctual lights sends out light.

@@ -31,6 +31,10 @@ pub enum FileError {
         "{path} has the format {found:?}, this program reads {expected:?}; use the program that wrote it, or bake again"
     )]
     Version { path: PathBuf, found: String, expected: &'static str },
+    #[error(
+        "{path} is from a bake of another scene, configuration or seed; resume with the same arguments, or delete it and start anew"
+    )]
+    OtherBake { path: PathBuf },
     #[error(transparent)]
     Output(#[from] OutputError),
 }

@@ -127,6 +127,10 @@ pub fn encode(
         container.tensors.insert("visibility_start".into(), tensor(Dtype::U32, &[surface.cell_start.len()], start));
         container.tensors.insert("visibility_key".into(), tensor(Dtype::U16, &[n], keys));
         container.tensors.insert("visibility".into(), tensor(Dtype::U8, &[n], surface.masks.clone()));
+        if !surface.far.is_empty() {
+            let far = le_bytes(surface.far.iter().flat_map(|&(entry, probe)| [entry, probe]).map(u32::to_le_bytes));
+            container.tensors.insert("visibility_far".into(), tensor(Dtype::U32, &[surface.far.len(), 2], far));
+        }
         container.metadata.insert("visibility.voxels_per_cell".into(), surface.voxels_per_cell.to_string());
     }
     let record = GridRecord {
@@ -338,7 +342,7 @@ fn decode_surface(reader: &Reader, grid: &Grid) -> Result<Option<SurfaceVisibili
     if !(1..=MAX_VOXELS_PER_CELL).contains(&voxels_per_cell) {
         return Err(format!("metadata 'visibility.voxels_per_cell' is {voxels_per_cell}"));
     }
-    let cells: usize = grid.cells().to_array().iter().map(|&n| n as usize).product();
+    let cells = grid.cell_count();
     let masks = reader.tensor("visibility", &[Dtype::U8], &[None])?.bytes.clone();
     let keys = &reader.tensor("visibility_key", &[Dtype::U16], &[Some(masks.len())])?.bytes;
     let start = &reader.tensor("visibility_start", &[Dtype::U32], &[Some(cells + 1)])?.bytes;
@@ -347,7 +351,17 @@ fn decode_surface(reader: &Reader, grid: &Grid) -> Result<Option<SurfaceVisibili
     if !ordered || cell_start[0] != 0 {
         return Err("tensor 'visibility_start' does not divide the entries among the cells".into());
     }
-    Ok(Some(SurfaceVisibility { voxels_per_cell, cell_start, keys: u16s(keys).collect(), masks }))
+    let mut far = Vec::new();
+    if reader.0.tensors.contains_key("visibility_far") {
+        let tensor = reader.tensor("visibility_far", &[Dtype::U32], &[None, Some(2)])?;
+        let numbers: Vec<u32> = tensor.bytes.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b)).collect();
+        far = numbers.as_chunks::<2>().0.iter().map(|pair| (pair[0], pair[1])).collect();
+        let in_range = |f: &(u32, u32)| (f.0 as usize) < masks.len() && (f.1 as usize) < grid.probe_count();
+        if !far.is_sorted() || !far.iter().all(in_range) {
+            return Err("tensor 'visibility_far' names entries or probes that there are not".into());
+        }
+    }
+    Ok(Some(SurfaceVisibility { voxels_per_cell, cell_start, keys: u16s(keys).collect(), masks, far }))
 }
 
 impl ProbeFile {

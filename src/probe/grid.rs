@@ -110,7 +110,9 @@ impl Grid {
                 if divisions.0 == 0 || divisions.1 == 0 || divisions.2 == 0 {
                     return Err(GridError::Divisions(divisions));
                 }
-                spread(high - low, UVec3::from(divisions), padding)
+                let (low_scene, high_scene) = scene_bounds(scene);
+                let usual = (high_scene - low_scene).max_element() / DEFAULT_CELLS;
+                spread(high - low, UVec3::from(divisions), padding, usual)
             }
             (Some(spacing), None) => {
                 if !(spacing > 0.0 && spacing.is_finite()) {
@@ -151,10 +153,14 @@ impl Grid {
         base.x + n.x * (base.y + n.y * base.z)
     }
 
-    /// Inverse of [`Self::cell_index`].
-    pub fn cell_base(&self, index: usize) -> UVec3 {
-        let n = self.cells().as_usizevec3();
-        UVec3::new((index % n.x) as u32, (index / n.x % n.y) as u32, (index / (n.x * n.y)) as u32)
+    pub fn cell_count(&self) -> usize {
+        self.cells().to_array().iter().map(|&n| n as usize).product()
+    }
+
+    /// Lowest corner of a cell; inverse of [`Self::cell_index`].
+    pub fn cell_base(&self, cell: usize) -> UVec3 {
+        let (nx, ny) = (self.cells().x as usize, self.cells().y as usize);
+        UVec3::new((cell % nx) as u32, (cell / nx % ny) as u32, (cell / (nx * ny)) as u32)
     }
 
     pub fn coordinate(&self, probe: ProbeIndex) -> UVec3 {
@@ -181,6 +187,12 @@ impl Grid {
         let margin = self.spacing * tolerance;
         let last = (self.divisions - UVec3::ONE).as_vec3();
         (self.origin - margin, self.origin + last * self.spacing + margin)
+    }
+
+    /// Whether a point lies in the probes' hull.
+    pub fn is_within(&self, position: Vec3) -> bool {
+        let g = self.grid_from_scene(position);
+        g.cmpge(Vec3::ZERO).all() && g.cmple((self.divisions - UVec3::ONE).as_vec3()).all()
     }
 
     /// The cell of a point; points outside use the nearest cell, at its face.
@@ -226,12 +238,12 @@ fn cover(extent: DVec3, spacing: f64, padding: f64) -> Result<(DVec3, UVec3), Gr
     Ok((DVec3::splat(spacing), cells.as_uvec3() + UVec3::ONE))
 }
 
-/// The spacing at which so many probes cover the extent and the padding.
-fn spread(extent: DVec3, divisions: UVec3, padding: f64) -> (DVec3, UVec3) {
+/// The spacing at which so many probes cover the extent and the padding; `usual` where there is no extent.
+fn spread(extent: DVec3, divisions: UVec3, padding: f64, usual: f64) -> (DVec3, UVec3) {
     let cells = (divisions - UVec3::ONE).as_dvec3();
     let room = (cells - 2.0 * padding).max(DVec3::splat(0.5));
     // A single layer needs a spacing too, for what is measured in spacings; so do axes along which the scene is flat.
     let layered = DVec3::select(divisions.cmpgt(UVec3::ONE), extent / room, extent);
-    let fallback = layered.max_element().max(f64::MIN_POSITIVE);
+    let fallback = if layered.max_element() > 0.0 { layered.max_element() } else { usual };
     (DVec3::select(layered.cmpgt(DVec3::splat(fallback * 1e-6)), layered, DVec3::splat(fallback)), divisions)
 }

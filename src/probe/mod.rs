@@ -4,6 +4,7 @@
 //! [`encode`] → [`file`]; [`volume`] and [`query`] are what shading uses, and the solver with it.
 
 pub mod capture;
+pub mod checkpoint;
 pub mod container;
 pub mod encode;
 pub mod file;
@@ -11,6 +12,7 @@ pub mod filter;
 pub mod grid;
 pub mod layout;
 pub mod map;
+pub mod need;
 pub mod overlap;
 pub mod placement;
 pub mod query;

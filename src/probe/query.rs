@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3, Vec3A};
 use serde::{Deserialize, Serialize};
 
 use super::grid::ProbeIndex;
-use super::surface_visibility::Facing;
+use super::surface_visibility::{Facing, Seen};
 use super::volume::Volume;
 use crate::math::octahedral::oct_from_direction;
 
@@ -137,19 +137,24 @@ impl Query<'_> {
         let (volume, settings) = (self.volume, self.settings);
         let grid = &volume.grid;
         let cell = grid.cell(point.position);
-        let stored_mask = match (visibility, &volume.surface_visibility) {
-            (Visibility::Stored, Some(surface)) => surface.mask(grid, point.position, point.facing),
-            (Visibility::Exact(mask), _) => mask,
-            _ => u8::MAX,
+        let seen = match (visibility, &volume.surface_visibility) {
+            (Visibility::Stored, Some(surface)) => surface.look_up(grid, point.position, point.facing),
+            (Visibility::Exact(mask), _) => Seen { mask, far: None },
+            _ => Seen { mask: u8::MAX, far: None },
         };
         let bias = (point.normal * settings.normal_bias + point.view * settings.view_bias) * grid.spacing_max();
         let biased = point.position + bias;
         let mut out = CornerWeights { probes: [ProbeIndex(0); 8], weights: [0.0; 8] };
+        if let Some(far) = seen.far {
+            out.probes[0] = far;
+            out.weights[0] = 1.0;
+            return out;
+        }
         for i in 0..8 {
             let probe = grid.corner(cell.base, i);
             out.probes[i as usize] = probe;
             let trilinear = floored_trilinear(cell.fraction, i, settings.trilinear_floor);
-            if trilinear <= 0.0 || stored_mask >> i & 1 == 0 || !volume.is_active(probe) {
+            if trilinear <= 0.0 || seen.mask >> i & 1 == 0 || !volume.is_active(probe) {
                 continue;
             }
             let to_probe = || (volume.position(probe) - point.position).normalize_or_zero();

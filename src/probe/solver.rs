@@ -36,7 +36,7 @@ impl Default for SolverSettings {
 }
 
 /// One sweep.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Bounce {
     pub index: u32,
     /// Largest change of any irradiance texel ÷ largest irradiance texel.
@@ -45,13 +45,30 @@ pub struct Bounce {
     pub energy: f64,
 }
 
-#[derive(Debug, Clone, Default)]
+/// How far the iteration has come; at its end, the result's figures.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Solution {
     pub bounces: Vec<Bounce>,
     pub converged: bool,
     /// Ratio of the last two changes; `None` before there are two.
     pub spectral_radius_estimate: Option<f64>,
+    /// Largest change of any irradiance texel in the last sweep, W·m⁻²; `None` before there was a second sweep.
+    pub last_change: Option<f64>,
     pub non_finite: u64,
+}
+
+impl Solution {
+    /// Takes the largest change of a sweep into account.
+    fn judge(&mut self, change: f64, residual: f64, settings: &SolverSettings) {
+        if let Some(previous) = self.last_change.filter(|&p| p > 0.0) {
+            self.spectral_radius_estimate = Some(change / previous);
+        }
+        // What is still to come is a geometric series in the ratio of the changes.
+        let ratio = self.spectral_radius_estimate.unwrap_or(f64::from(settings.albedo_max));
+        let missing = if ratio < 1.0 { residual * ratio / (1.0 - ratio) } else { f64::INFINITY };
+        self.last_change = Some(change);
+        self.converged = change == 0.0 || missing <= f64::from(settings.tolerance);
+    }
 }
 
 /// Where the captures of all probes come from: memory, or traced again.
@@ -82,49 +99,58 @@ struct Swept {
     /// Interior texels, W·m⁻².
     irradiance: Vec<Vec3A>,
     non_finite: u64,
-    /// Of every surfel: the corners of its cell that it sees. Neither moves, so the first sweep looks them up for all;
-    /// empty where the method does not store visibility at surfaces.
-    masks: Vec<u8>,
 }
 
 impl<C: Captures> Solver<'_, C> {
-    /// Fills the volume's irradiance. Its positions, states and visibility must stand already.
-    pub fn solve(&self, volume: &mut Volume, on_bounce: impl Fn(&Bounce)) -> Solution {
+    /// Fills the volume's irradiance. Its positions, states and visibility must stand already; after an interruption its
+    /// irradiance too, as it was when `progress` was reported.
+    pub fn solve(
+        &self,
+        volume: &mut Volume,
+        mut progress: Solution,
+        mut on_bounce: impl FnMut(&Solution, &Volume),
+    ) -> Solution {
         let settings = self.settings;
-        let mut solution = Solution::default();
-        let mut previous_change = None;
-        let mut masks: Option<Vec<Vec<u8>>> = None;
-        for index in 0..=settings.max_bounces {
-            let mut swept = self.sweep(volume, masks.as_deref());
-            solution.non_finite += swept.iter().map(|s| s.non_finite).sum::<u64>();
-            let bounce = measure(volume, &swept, index);
-            store(volume, &swept);
-            masks.get_or_insert_with(|| swept.iter_mut().map(|s| std::mem::take(&mut s.masks)).collect());
-            on_bounce(&bounce.0);
-            solution.bounces.push(bounce.0);
-            let change = bounce.1;
-            if index > 0 {
-                if let Some(previous) = previous_change.filter(|&p| p > 0.0) {
-                    solution.spectral_radius_estimate = Some(change / previous);
-                }
-                // What is still to come is a geometric series in the ratio of the changes.
-                let ratio = solution.spectral_radius_estimate.unwrap_or(f64::from(settings.albedo_max));
-                let missing = if ratio < 1.0 { bounce.0.residual * ratio / (1.0 - ratio) } else { f64::INFINITY };
-                previous_change = Some(change);
-                if change == 0.0 || missing <= f64::from(settings.tolerance) {
-                    solution.converged = true;
-                    break;
-                }
+        let mut masks = None;
+        for index in progress.bounces.len() as u32..=settings.max_bounces {
+            if progress.converged {
+                break;
             }
+            // Before the first sweep there is nothing in the probes to ask for.
+            let masks = (index > 0).then(|| &*masks.get_or_insert_with(|| self.masks(volume)));
+            let swept = self.sweep(volume, masks.map(Vec::as_slice));
+            progress.non_finite += swept.iter().map(|s| s.non_finite).sum::<u64>();
+            let (bounce, change) = measure(volume, &swept, index);
+            store(volume, &swept);
+            progress.bounces.push(bounce);
+            if index > 0 {
+                progress.judge(change, bounce.residual, settings);
+            }
+            on_bounce(&progress, volume);
         }
         if !self.gathers_emission {
             self.add_emission(volume);
         }
-        solution
+        progress
     }
 
-    /// Irradiance of every probe from the outgoing radiance that the present irradiance gives. `masks` are those that
-    /// the first sweep returned; without them nothing is asked of the probes, for there is nothing in them yet.
+    /// Of every probe's surfels: the corners of its cell that it sees, 0 where it must be looked up again. Neither
+    /// surfels nor probes move, so once is enough; empty where the method does not store visibility at surfaces.
+    fn masks(&self, volume: &Volume) -> Vec<Vec<u8>> {
+        let Some(surface) = &volume.surface_visibility else { return vec![Vec::new(); volume.states.len()] };
+        let of_probe = |p: usize| -> Vec<u8> {
+            if volume.states[p] != ProbeState::Active {
+                return Vec::new();
+            }
+            self.captures.with(p, |capture| {
+                capture.surfels.iter().map(|s| surface.look_up(&volume.grid, s.position, s.facing).mask).collect()
+            })
+        };
+        (0..volume.states.len()).into_par_iter().map(of_probe).collect()
+    }
+
+    /// Irradiance of every probe from the outgoing radiance that the present irradiance gives; without `masks` from the
+    /// direct radiance alone.
     fn sweep(&self, volume: &Volume, masks: Option<&[Vec<u8>]>) -> Vec<Swept> {
         let kernel = self.kernel;
         let query = Query { volume, settings: self.query };
@@ -139,7 +165,10 @@ impl<C: Captures> Solver<'_, C> {
                 for (i, surfel) in capture.surfels.iter().enumerate() {
                     let mut outgoing = surfel.direct_radiance;
                     if let Some(masks) = masks {
-                        let visibility = masks[p].get(i).map_or(Visibility::Stored, |&mask| Visibility::Exact(mask));
+                        let visibility = match masks[p].get(i) {
+                            None | Some(0) => Visibility::Stored,
+                            Some(&mask) => Visibility::Exact(mask),
+                        };
                         let weights = query.weights(&self.query_point(surfel, volume.positions[p]), visibility);
                         outgoing += reflected_radiance(surfel.albedo(), query.blend(&weights, surfel.oct()));
                     }
@@ -151,13 +180,7 @@ impl<C: Captures> Solver<'_, C> {
                 }
                 let mut irradiance = vec![Vec3A::ZERO; kernel.rows()];
                 kernel.irradiance(&radiance, &mut irradiance);
-                let masks = match (masks, &volume.surface_visibility) {
-                    (None, Some(surface)) => {
-                        capture.surfels.iter().map(|s| surface.mask(&volume.grid, s.position, s.facing)).collect()
-                    }
-                    _ => Vec::new(),
-                };
-                Swept { irradiance, non_finite, masks }
+                Swept { irradiance, non_finite }
             })
         };
         (0..volume.states.len()).into_par_iter().map(probe).collect()

@@ -8,11 +8,13 @@
 //!
 //! Storage: `key = voxel·6 + facing` (u16, voxel = x + n·(y + n·z), facing = 2·axis + (1 where negative)), sorted
 //! within each cell, with the mask (u8, bit i = corner i) beside it; `cell_start[c]..cell_start[c + 1]` are cell c's.
+//! Where a surface sees none of its eight probes — under a table, behind a pillar — a pair of u32 names its entry and
+//! a probe farther away that it does see.
 
 use glam::{UVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::grid::Grid;
+use super::grid::{Grid, ProbeIndex};
 use super::overlap::triangle_meets_box;
 use super::placement::ProbeState;
 use crate::math::random::{Purpose, Random};
@@ -42,15 +44,51 @@ pub struct SurfaceVisibility {
     pub cell_start: Vec<u32>,
     pub keys: Vec<u16>,
     pub masks: Vec<u8>,
+    /// Entries that see none of their eight probes, each with a probe of the cells around that they do see; sorted.
+    pub far: Vec<(u32, u32)>,
+}
+
+/// What a point sees of its eight probes, bit i for corner i; of none, a farther one may stand in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Seen {
+    pub mask: u8,
+    pub far: Option<ProbeIndex>,
+}
+
+/// A table with what is known beside it while baking.
+#[derive(Debug, Clone)]
+pub struct Measured {
+    pub table: SurfaceVisibility,
+    /// Per entry: whether the front of a surface, or a surface that has no back, faces there.
+    pub fronts: Vec<bool>,
+    pub rays: u64,
+}
+
+/// One entry of the table, decoded.
+#[derive(Debug, Clone, Copy)]
+pub struct Entry {
+    pub voxel: UVec3,
+    /// Main direction that the surface faces, unit.
+    pub facing: Vec3,
+    /// Bit i: whether corner i is visible.
+    pub mask: u8,
+    /// Index in the table.
+    pub index: usize,
 }
 
 /// Voxels are taken larger by this share on every side when surfaces are sorted into them, so that a surface on the
 /// border of two is known in both, on whichever side of it rounding puts the point that asks.
 const VOXEL_MARGIN: f32 = 0.03;
 
+/// Where the survey found no surface of this facing in a point's own voxel, one this many voxels away may stand in.
+const MISSED_REACH: u32 = 3;
+
+/// Points nearer to a voxel's border than this share of its side may use the voxel beyond.
+const STRIP: f32 = 0.25;
+
 /// One side of a triangle in one voxel. Small, for there are millions and they are sorted.
 #[derive(Debug, Clone, Copy)]
-struct Entry {
+struct Side {
     cell: u32,
     key: u16,
     /// Whether this is the back of the triangle.
@@ -59,7 +97,7 @@ struct Entry {
     tally: Tally,
 }
 
-/// What the points of an [`Entry`] see.
+/// What the points of a [`Side`] see.
 #[derive(Debug, Clone, Copy, Default)]
 struct Tally {
     /// Rays traced: at most `SEARCH_POINTS` × 8.
@@ -82,19 +120,65 @@ impl Tally {
 }
 
 impl SurfaceVisibility {
-    /// Which of the eight corners of its cell a surface point sees. All of them where nothing is known.
-    pub fn mask(&self, grid: &Grid, position: Vec3, facing: Facing) -> u8 {
+    /// What a surface point sees: everything where no surface is known, nothing where only others are.
+    pub fn look_up(&self, grid: &Grid, position: Vec3, facing: Facing) -> Seen {
         let cell = grid.cell(position);
         let n = self.voxels_per_cell;
-        let voxel = voxel_of(cell.fraction, n);
-        let key = key(voxel, facing, n);
         let index = grid.cell_index(cell.base);
-        let range = self.cell_start[index] as usize..self.cell_start[index + 1] as usize;
-        let (keys, masks) = (&self.keys[range.clone()], &self.masks[range]);
-        match keys.binary_search(&key) {
-            Ok(found) => masks[found],
-            Err(_) => nearest_entry(keys, key, n).map_or(u8::MAX, |found| masks[found]),
+        let first = self.cell_start[index] as usize;
+        let keys = &self.keys[first..self.cell_start[index + 1] as usize];
+        let wanted = key(voxel_of(cell.fraction, n), facing, n);
+        // The survey covers the grid's hull; beyond it the nearest surface of the rim has to do.
+        let surveyed = grid.is_within(position) && !keys.is_empty();
+        let found = match keys.binary_search(&wanted) {
+            Ok(found) => Some(found),
+            Err(_) => nearest_entry(keys, wanted, n, if surveyed { MISSED_REACH } else { 2 * n }),
+        };
+        let Some(found) = found else {
+            return Seen { mask: if surveyed { 0 } else { u8::MAX }, far: None };
+        };
+        let mask = self.masks[first + found];
+        if mask != 0 {
+            return Seen { mask, far: None };
         }
+        let beside = self.beside(keys, first, cell.fraction, facing);
+        Seen { mask: beside, far: if beside == 0 { self.far_probe(first + found) } else { None } }
+    }
+
+    /// Mask of the voxel across a border that the point is close to, 0 where there is none.
+    ///
+    /// Where walls meet, the survey may miss a strip much narrower than a voxel; it continues in the next one.
+    fn beside(&self, keys: &[u16], first: usize, fraction: Vec3, facing: Facing) -> u8 {
+        let n = self.voxels_per_cell;
+        let voxel = voxel_of(fraction, n);
+        let inside = fraction * n as f32 - voxel.as_vec3();
+        // Along each axis: towards the nearer border, if near enough and within the cell.
+        let last = n - 1;
+        let step = |axis: usize| match inside[axis] {
+            x if x < STRIP && voxel[axis] > 0 => Some(voxel[axis] - 1),
+            x if x > 1.0 - STRIP && voxel[axis] < last => Some(voxel[axis] + 1),
+            _ => None,
+        };
+        let steps = [step(0), step(1), step(2)];
+        // One axis at a time first, then two, then all three.
+        [0b001, 0b010, 0b100, 0b011, 0b101, 0b110, 0b111u32]
+            .into_iter()
+            .filter_map(|axes| {
+                let mut neighbour = voxel;
+                for axis in (0..3).filter(|axis| axes >> axis & 1 == 1) {
+                    neighbour[axis] = steps[axis]?;
+                }
+                let found = keys.binary_search(&key(neighbour, facing, n)).ok()?;
+                Some(self.masks[first + found])
+            })
+            .find(|&mask| mask != 0)
+            .unwrap_or(0)
+    }
+
+    /// The probe beyond its own cell that stands in for an entry which sees none of its eight.
+    fn far_probe(&self, entry: usize) -> Option<ProbeIndex> {
+        let found = self.far.binary_search_by_key(&(entry as u32), |f| f.0).ok()?;
+        Some(ProbeIndex(self.far[found].1))
     }
 
     /// Whether no entry hides an active probe: then the table says nothing.
@@ -106,9 +190,25 @@ impl SurfaceVisibility {
         })
     }
 
+    /// What is known about one cell.
+    pub fn entries(&self, cell: usize) -> impl Iterator<Item = Entry> + '_ {
+        let n = self.voxels_per_cell;
+        let range = self.cell_start[cell] as usize..self.cell_start[cell + 1] as usize;
+        range.map(move |i| {
+            let facing = u32::from(self.keys[i]) % 6;
+            let sign = if facing.is_multiple_of(2) { 1.0 } else { -1.0 };
+            Entry {
+                voxel: voxel_of_key(self.keys[i], n),
+                facing: Vec3::AXES[facing as usize / 2] * sign,
+                mask: self.masks[i],
+                index: i,
+            }
+        })
+    }
+
     /// Bytes of its tensors.
     pub fn bytes(&self) -> u64 {
-        (self.cell_start.len() * 4 + self.keys.len() * 3) as u64
+        (self.cell_start.len() * 4 + self.keys.len() * 3 + self.far.len() * 8) as u64
     }
 
     /// Measures every surface within the grid's hull.
@@ -120,17 +220,18 @@ impl SurfaceVisibility {
         positions: &[Vec3],
         voxels_per_cell: u32,
         seed: u64,
-    ) -> (SurfaceVisibility, u64) {
+    ) -> Measured {
         let survey = Survey { scene, tracer, grid, states, positions, n: voxels_per_cell, seed };
-        let mut entries: Vec<Entry> =
+        let mut sides: Vec<Side> =
             (0..scene.mesh.triangles.len() as u32).into_par_iter().flat_map_iter(|t| survey.triangle(t)).collect();
         // Sums of counts do not depend on the order, so neither does the result.
-        entries.par_sort_unstable_by_key(|e| (e.cell, e.key));
-        let mut rays: u64 = entries.iter().map(|e| u64::from(e.tally.rays)).sum();
-        let mut groups: Vec<&mut [Entry]> = entries.chunk_by_mut(|a, b| (a.cell, a.key) == (b.cell, b.key)).collect();
+        sides.par_sort_unstable_by_key(|e| (e.cell, e.key));
+        let mut rays: u64 = sides.iter().map(|e| u64::from(e.tally.rays)).sum();
+        let mut groups: Vec<&mut [Side]> = sides.chunk_by_mut(|a, b| (a.cell, a.key) == (b.cell, b.key)).collect();
         rays += groups.par_iter_mut().map(|group| survey.search(group)).sum::<u64>();
         let mut table = SurfaceVisibility { voxels_per_cell, ..Default::default() };
-        let cells: usize = grid.cells().to_array().iter().map(|&n| n as usize).product();
+        let mut fronts = Vec::new();
+        let cells = grid.cell_count();
         let mut groups = groups.into_iter().peekable();
         for cell in 0..cells as u32 {
             table.cell_start.push(table.keys.len() as u32);
@@ -142,15 +243,16 @@ impl SurfaceVisibility {
                 }
                 table.keys.push(group[0].key);
                 table.masks.push(mask);
+                fronts.push(group.iter().any(|e| e.tally.outside));
             }
         }
         table.cell_start.push(table.keys.len() as u32);
-        (table, rays)
+        Measured { table, fronts, rays }
     }
 }
 
 /// Corners that most points see; points on edges vote only where there are no others.
-fn majority(group: &[Entry]) -> u8 {
+fn majority(group: &[Side]) -> u8 {
     let only_edges = group.iter().all(|e| e.tally.edge_only || e.tally.points == 0);
     let voters = || group.iter().map(|e| &e.tally).filter(|t| only_edges || !t.edge_only);
     let points: u32 = voters().map(|t| u32::from(t.points)).sum();
@@ -189,14 +291,16 @@ impl Facing {
     }
 }
 
-/// The entry that faces the same way in the nearest voxel, else any in the same voxel.
-fn nearest_entry(keys: &[u16], wanted: u16, n: u32) -> Option<usize> {
+/// The entry that faces the same way in the nearest voxel, at most `reach` voxels away.
+fn nearest_entry(keys: &[u16], wanted: u16, n: u32, reach: u32) -> Option<usize> {
     let voxel = |key: u16| voxel_of_key(key, n).as_ivec3();
     let target = voxel(wanted);
     (0..keys.len())
         .filter(|&i| keys[i] % 6 == wanted % 6)
-        .min_by_key(|&i| voxel(keys[i]).distance_squared(target))
-        .or_else(|| keys.iter().position(|k| k / 6 == wanted / 6))
+        .map(|i| (voxel(keys[i]).distance_squared(target), i))
+        .filter(|(distance_squared, _)| *distance_squared as u32 <= reach * reach)
+        .min()
+        .map(|(_, i)| i)
 }
 
 /// Bit i: whether corner i of the cell is an active probe.
@@ -223,7 +327,7 @@ impl Survey<'_> {
     }
 
     /// Tallies of both sides of a triangle, in every voxel that it meets.
-    fn triangle(&self, triangle: u32) -> Vec<Entry> {
+    fn triangle(&self, triangle: u32) -> Vec<Side> {
         let mut out = Vec::new();
         let corners = self.mesh().corners(TriangleIndex(triangle));
         let in_grid = corners.map(|p| self.grid.grid_from_scene(p));
@@ -252,7 +356,7 @@ impl Survey<'_> {
     }
 
     /// One triangle in one cell; `local` are its corners in units of the cell.
-    fn cell(&self, triangle: u32, local: &[Vec3; 3], base: UVec3, out: &mut Vec<Entry>) {
+    fn cell(&self, triangle: u32, local: &[Vec3; 3], base: UVec3, out: &mut Vec<Side>) {
         if active_corners(self.grid, self.states, base) == 0 {
             return;
         }
@@ -275,9 +379,9 @@ impl Survey<'_> {
                     }
                     for (is_back, facing) in [(false, front), (true, front.opposite())] {
                         let key = key(voxel, facing, self.n);
-                        let mut entry = Entry { cell, key, is_back, triangle, tally: Tally::default() };
-                        entry.tally = self.tally(&entry, base, &around, FIRST_POINTS);
-                        out.push(entry);
+                        let mut side = Side { cell, key, is_back, triangle, tally: Tally::default() };
+                        side.tally = self.tally(&side, base, &around, FIRST_POINTS);
+                        out.push(side);
                     }
                 }
             }
@@ -286,41 +390,41 @@ impl Survey<'_> {
 
     /// Looks again, with more points, where nothing on the outside of the surfaces of a voxel has seen a probe yet.
     /// Returns the number of rays.
-    fn search(&self, group: &mut [Entry]) -> u64 {
+    fn search(&self, group: &mut [Side]) -> u64 {
         if group.iter().any(|e| e.tally.settles()) {
             return 0;
         }
         let mut rays = 0;
         let base = self.grid.cell_base(group[0].cell as usize);
         let centre = base.as_vec3() + (voxel_of_key(group[0].key, self.n).as_vec3() + 0.5) / self.n as f32;
-        let unseen = |e: &Entry| e.tally.outside && !e.tally.edge_only && e.tally.rays > 0;
+        let unseen = |e: &Side| e.tally.outside && !e.tally.edge_only && e.tally.rays > 0;
         let count = group.iter().filter(|e| unseen(e)).count().max(1) as u32;
         let points = (GROUP_SEARCH_POINTS / count).clamp(ALL_POINTS / 2, SEARCH_POINTS);
-        for entry in group.iter_mut().filter(|e| unseen(e)) {
-            let corners = self.mesh().corners(TriangleIndex(entry.triangle));
+        for side in group.iter_mut().filter(|e| unseen(e)) {
+            let corners = self.mesh().corners(TriangleIndex(side.triangle));
             let around = corners.map(|p| (self.grid.grid_from_scene(p) - centre) * self.n as f32);
-            entry.tally = self.tally(entry, base, &around, points);
-            rays += u64::from(entry.tally.rays);
+            side.tally = self.tally(side, base, &around, points);
+            rays += u64::from(side.tally.rays);
         }
         rays
     }
 
     /// Rays from points of a triangle within a voxel; `around` are its corners relative to the voxel's centre. Up to
     /// `search` points are tried until one sees any probe.
-    fn tally(&self, entry: &Entry, base: UVec3, around: &[Vec3; 3], search: u32) -> Tally {
-        let triangle = TriangleIndex(entry.triangle);
+    fn tally(&self, side: &Side, base: UVec3, around: &[Vec3; 3], search: u32) -> Tally {
+        let triangle = TriangleIndex(side.triangle);
         let corners = &self.mesh().corners(triangle);
         let front = self.mesh().geometric_normal(triangle);
-        let normal = if entry.is_back { -front } else { front };
+        let normal = if side.is_back { -front } else { front };
         let active = active_corners(self.grid, self.states, base);
-        let stream = u64::from(entry.cell) << 16 | u64::from(entry.key);
+        let stream = u64::from(side.cell) << 16 | u64::from(side.key);
         let mut random = Random::new(
             self.seed,
             Purpose::SurfaceVisibility,
             stream,
-            2 * u64::from(entry.triangle) + u64::from(entry.is_back),
+            2 * u64::from(side.triangle) + u64::from(side.is_back),
         );
-        let outside = !entry.is_back || self.scene.material(triangle).double_sided;
+        let outside = !side.is_back || self.scene.material(triangle).double_sided;
         let mut tally = Tally { outside, ..Tally::default() };
         for tried in 0.. {
             let enough = match tally.points {

@@ -79,6 +79,6 @@ pub struct Numerics {
     pub hits_outside_volume: u64,
     pub probes_inside_geometry: usize,
     pub dropped_triangles: u64,
-    /// Materials whose albedo exceeds `solver.albedo_max` somewhere and is clamped.
+    /// Materials whose albedo can exceed `solver.albedo_max`, and is clamped to it.
     pub albedo_clamped: u64,
 }

@@ -54,3 +54,66 @@ pub unsafe fn occluded(scene: RTCScene, ray: &mut AlignedRay) -> bool {
     unsafe { embree4_sys::rtcOccluded1(scene, std::ptr::from_mut(ray).cast(), null_mut()) };
     ray.0.tfar < 0.0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use embree4_rs::Device;
+    use embree4_rs::geometry::{Geometry, TriangleMeshGeometry};
+    use embree4_sys as sys;
+
+    /// What nobody writes by chance.
+    const FILL: u8 = 0xA5;
+
+    /// A ray-hit between two stretches of filled memory, as large as a field or two more could be.
+    #[repr(C, align(64))]
+    struct Guarded {
+        before: [u8; 64],
+        ray_hit: RayHit,
+        after: [u8; 64],
+    }
+
+    /// Embree writes into the 80 bytes of the bindings and the word behind them, and nowhere else. `rtcIntersect1` is
+    /// called on several rays, hits and misses, that start from filled memory: every byte that changes is one that
+    /// Embree wrote.
+    #[test]
+    fn embree_stays_within_its_struct() {
+        let device = Device::try_new(Some("threads=1\0")).unwrap();
+        // SAFETY: `Device` has the size of its only field, the handle.
+        let handle = unsafe { std::ptr::from_ref(&device).cast::<sys::RTCDevice>().read() };
+        let corners = [(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (0.0, 1.0, 0.0)];
+        let triangle = TriangleMeshGeometry::try_new(&device, &corners, &[(0, 1, 2)]).unwrap();
+        // SAFETY: device and geometry are live; the scene is released below.
+        let (scene, version) = unsafe {
+            let scene = sys::rtcNewScene(handle);
+            sys::rtcAttachGeometryByID(scene, *triangle.handle(), 0);
+            sys::rtcCommitScene(scene);
+            (scene, sys::rtcGetDeviceProperty(handle, sys::RTCDeviceProperty::VERSION))
+        };
+        let (mut hits, mut misses) = (0, 0);
+        for i in 0..64 {
+            let x = (i as f32 - 32.0) / 16.0;
+            let ray =
+                RTCRay { org_x: x, org_z: 1.0, dir_z: -1.0, tfar: f32::INFINITY, mask: u32::MAX, ..Default::default() };
+            let mut guarded = Guarded { before: [FILL; 64], ray_hit: RayHit::new(ray), after: [FILL; 64] };
+            guarded.ray_hit.inst_prim_id = u32::from_ne_bytes([FILL; 4]);
+            guarded.ray_hit.base.hit.geomID = sys::RTC_INVALID_GEOMETRY_ID;
+            // SAFETY: the scene is live and committed.
+            unsafe { intersect(scene, &mut guarded.ray_hit) };
+            assert_eq!(guarded.before, [FILL; 64], "Embree wrote before the struct");
+            assert_eq!(guarded.after, [FILL; 64], "Embree wrote behind the struct");
+            assert_eq!(guarded.ray_hit.canary, CANARY, "Embree wrote behind the field instPrimID");
+            let wrote = guarded.ray_hit.inst_prim_id != u32::from_ne_bytes([FILL; 4]);
+            if guarded.ray_hit.base.hit.geomID == sys::RTC_INVALID_GEOMETRY_ID {
+                misses += 1;
+            } else {
+                hits += 1;
+                // The reason for all this: from 4.3 on the word behind the bindings' struct is written on every hit.
+                assert_eq!(wrote, version >= 40_300, "the word behind 80 bytes, Embree {version}");
+            }
+        }
+        assert!(hits > 10 && misses > 10, "{hits} hits, {misses} misses");
+        // SAFETY: the only reference.
+        unsafe { sys::rtcReleaseScene(scene) };
+    }
+}

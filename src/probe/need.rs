@@ -1,0 +1,159 @@
+//! Probes go where surfaces need them.
+//!
+//! The survey of the surfaces ([`super::surface_visibility`]) tells which probes no surface sees — they lie below a
+//! floor, behind a wall, in a cupboard — and which surfaces see no probe. Each such probe is moved next to such a
+//! surface within its own cells; what still is not seen afterwards need not be baked. Surfaces that see none of their
+//! eight probes even then are given one from the cells around.
+
+use glam::{UVec3, Vec3};
+use rayon::prelude::*;
+
+use super::grid::{Grid, ProbeIndex};
+use super::placement::{Placement, ProbeState, Settler};
+use super::surface_visibility::{Entry, Measured, SurfaceVisibility};
+use crate::trace::{Ray, Tracer};
+
+/// How far from a surface in need a probe is put, in spacings; half the free space where that is less.
+const DISTANCE: f32 = 0.2;
+
+/// Layers of probes around a cell that are searched for surfaces which see none of its eight.
+const FAR_RINGS: u32 = 3;
+
+/// Places tried for one probe, nearest first.
+const MAX_TRIES: usize = 12;
+
+/// A stretch of surface that sees no probe: a point just off it, and the direction that it faces.
+#[derive(Debug, Clone, Copy)]
+struct Need {
+    point: Vec3,
+    normal: Vec3,
+}
+
+/// Which probes any surface sees that `counts`, by its index in the table.
+pub fn seen_probes(
+    grid: &Grid,
+    placement: &Placement,
+    table: &SurfaceVisibility,
+    counts: impl Fn(usize) -> bool,
+) -> Vec<bool> {
+    let mut seen = vec![false; grid.probe_count()];
+    for cell in 0..grid.cell_count() {
+        let base = grid.cell_base(cell);
+        let union = table.entries(cell).filter(|e| counts(e.index)).fold(0, |union, entry| union | entry.mask);
+        for i in (0..8).filter(|i| union >> i & 1 == 1) {
+            let probe = grid.corner(base, i).0 as usize;
+            seen[probe] |= placement.states[probe] == ProbeState::Active;
+        }
+    }
+    seen
+}
+
+/// Moves probes that nothing sees to surfaces that see none. Returns how many were moved; the survey is out of date
+/// then.
+pub fn relocate(settler: &Settler, grid: &Grid, placement: &mut Placement, survey: &Measured) -> usize {
+    let table = &survey.table;
+    // A probe under the floor may see the floor's back; no one else does.
+    let seen = seen_probes(grid, placement, table, |entry| survey.fronts[entry]);
+    let idle = |probe: usize| !seen[probe] && placement.sampled[probe];
+    let needs_of_cell = |cell: usize| -> Vec<Need> {
+        if !(0..8).any(|i| idle(grid.corner(grid.cell_base(cell), i).0 as usize)) {
+            return Vec::new();
+        }
+        table.entries(cell).filter(|entry| entry.mask == 0).map(|entry| need(grid, table, cell, &entry)).collect()
+    };
+    let needs: Vec<Vec<Need>> = (0..grid.cell_count()).into_par_iter().map(needs_of_cell).collect();
+    let moves: Vec<(usize, Vec3)> = (0..grid.probe_count())
+        .into_par_iter()
+        .filter(|&probe| idle(probe))
+        .filter_map(|probe| {
+            let grid_point = grid.origin + grid.position_in_grid(ProbeIndex(probe as u32));
+            let mut nearby: Vec<Need> =
+                cells_around(grid, ProbeIndex(probe as u32)).flat_map(|cell| needs[cell].iter().copied()).collect();
+            nearby
+                .sort_by(|a, b| a.point.distance_squared(grid_point).total_cmp(&b.point.distance_squared(grid_point)));
+            // Spread over the whole list, so that one blocked corner does not use up all tries.
+            let step = nearby.len().div_ceil(MAX_TRIES).max(1);
+            nearby.iter().step_by(step).find_map(|need| place_beside(settler, need)).map(|position| (probe, position))
+        })
+        .collect();
+    for &(probe, position) in &moves {
+        placement.states[probe] = ProbeState::Active;
+        placement.positions[probe] = position;
+    }
+    placement.relocated += moves.len();
+    moves.len()
+}
+
+fn need(grid: &Grid, table: &SurfaceVisibility, cell: usize, entry: &Entry) -> Need {
+    let voxel_size = grid.spacing / table.voxels_per_cell as f32;
+    let voxel = grid.cell_base(cell) * table.voxels_per_cell + entry.voxel;
+    let centre = (voxel.as_vec3() + 0.5) * voxel_size;
+    let normal = entry.facing;
+    // The surface lies somewhere in the voxel; the voxel's face on the open side is surely off it.
+    Need { point: grid.origin + centre + normal * (voxel_size * normal).length() * 0.5, normal }
+}
+
+/// For every entry that sees none of its eight probes: the nearest active probe of the cells around that it sees.
+pub fn far_probes(tracer: &Tracer, grid: &Grid, placement: &Placement, table: &SurfaceVisibility) -> Vec<(u32, u32)> {
+    let of_cell = |cell: usize| -> Vec<(u32, u32)> {
+        let in_need: Vec<Entry> = table.entries(cell).filter(|entry| entry.mask == 0).collect();
+        if in_need.is_empty() {
+            return Vec::new();
+        }
+        let base = grid.cell_base(cell);
+        let rings: Vec<Vec<ProbeIndex>> =
+            (1..=FAR_RINGS).map(|ring| active_in_ring(grid, placement, base, ring)).collect();
+        in_need
+            .iter()
+            .filter_map(|entry| {
+                let need = need(grid, table, cell, entry);
+                let seen = rings.iter().find_map(|ring| nearest_visible(tracer, placement, ring, &need))?;
+                Some((entry.index as u32, seen.0))
+            })
+            .collect()
+    };
+    // Cells come in order, and so do a cell's entries: the list is sorted.
+    (0..grid.cell_count()).into_par_iter().flat_map_iter(of_cell).collect()
+}
+
+/// Active probes of the `ring`-th layer around the eight corners of a cell.
+fn active_in_ring(grid: &Grid, placement: &Placement, base: UVec3, ring: u32) -> Vec<ProbeIndex> {
+    let last = grid.divisions - UVec3::ONE;
+    let low = base.saturating_sub(UVec3::splat(ring));
+    let high = (base + UVec3::splat(1 + ring)).min(last);
+    let inner = |c: UVec3| (c + ring).cmpgt(base).all() && c.cmplt(base + UVec3::splat(1 + ring)).all();
+    (low.z..=high.z)
+        .flat_map(|z| (low.y..=high.y).flat_map(move |y| (low.x..=high.x).map(move |x| UVec3::new(x, y, z))))
+        .filter(|&coordinate| !inner(coordinate))
+        .map(|coordinate| grid.index(coordinate))
+        .filter(|probe| placement.states[probe.0 as usize] == ProbeState::Active)
+        .collect()
+}
+
+/// The nearest of some probes that a surface sees.
+fn nearest_visible(tracer: &Tracer, placement: &Placement, probes: &[ProbeIndex], need: &Need) -> Option<ProbeIndex> {
+    let position = |probe: ProbeIndex| placement.positions[probe.0 as usize];
+    let distance = |probe: ProbeIndex| position(probe).distance_squared(need.point);
+    let mut before: Vec<ProbeIndex> =
+        probes.iter().copied().filter(|&p| (position(p) - need.point).dot(need.normal) > 0.0).collect();
+    before.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
+    before.into_iter().find(|&p| !tracer.occluded(Ray::segment(position(p), need.point, 0)))
+}
+
+/// A place from which the surface can be seen; `None` where its surroundings are the inside of something.
+fn place_beside(settler: &Settler, need: &Need) -> Option<Vec3> {
+    let wanted = DISTANCE * settler.spacing_m;
+    let free = settler.world.tracer.closest(Ray::new(need.point, need.normal, 0)).map_or(f32::INFINITY, |hit| hit.t);
+    let position = need.point + need.normal * wanted.min(0.5 * free);
+    (!settler.is_inside(&settler.look(position))).then_some(position)
+}
+
+/// Cells that a probe is a corner of.
+fn cells_around(grid: &Grid, probe: ProbeIndex) -> impl Iterator<Item = usize> + '_ {
+    let last = grid.cells() - UVec3::ONE;
+    let high = grid.coordinate(probe).min(last);
+    let low = grid.coordinate(probe).saturating_sub(UVec3::ONE).min(last);
+    (low.z..=high.z).flat_map(move |z| {
+        (low.y..=high.y).flat_map(move |y| (low.x..=high.x).map(move |x| grid.cell_index(UVec3::new(x, y, z))))
+    })
+}

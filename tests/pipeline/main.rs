@@ -1,0 +1,20 @@
+//! The pipeline as its users meet it: the built program on scenes from `scenes/`, from the shared folder and built in
+//! code. What it writes is read by a decoder of the tests' own ([`probe_file`]), so that an error which bake and query
+//! share cannot hide.
+
+mod adversarial;
+mod closed_forms;
+mod command_line;
+#[path = "../common/mod.rs"]
+mod common;
+mod damage;
+mod decoding;
+mod determinism;
+mod distances;
+mod furnace;
+mod leaks;
+mod plan;
+mod probe_file;
+mod program;
+mod reports;
+mod shapes;

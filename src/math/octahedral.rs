@@ -7,16 +7,19 @@
 use glam::{Vec2, Vec3};
 
 /// 1 for positive numbers and zero, −1 for negative ones (so that the fold has no hole at 0).
+#[inline]
 fn sign_not_zero(v: Vec2) -> Vec2 {
     Vec2::new(if v.x >= 0.0 { 1.0 } else { -1.0 }, if v.y >= 0.0 { 1.0 } else { -1.0 })
 }
 
 /// Folds the lower half of the octahedron over the upper one (and back: the fold is its own inverse).
+#[inline]
 fn fold(p: Vec2) -> Vec2 {
     (Vec2::ONE - Vec2::new(p.y, p.x).abs()) * sign_not_zero(p)
 }
 
 /// `oct` of a direction of any length but zero; inverse of [`direction_from_oct`].
+#[inline]
 pub fn oct_from_direction(direction: Vec3) -> Vec2 {
     let scale = 1.0 / (direction.x.abs() + direction.y.abs() + direction.z.abs());
     let p = direction.truncate() * scale;
@@ -24,6 +27,7 @@ pub fn oct_from_direction(direction: Vec3) -> Vec2 {
 }
 
 /// The point of the octahedron |x|+|y|+|z| = 1 above or below `oct`.
+#[inline]
 fn point_on_octahedron(oct: Vec2) -> Vec3 {
     let z = 1.0 - oct.x.abs() - oct.y.abs();
     if z >= 0.0 { oct.extend(z) } else { fold(oct).extend(z) }
@@ -43,6 +47,7 @@ pub fn solid_angle_density(oct: Vec2) -> f32 {
 }
 
 /// [`direction_from_oct`] and [`solid_angle_density`] at once, for one square root.
+#[inline]
 pub fn direction_and_density(oct: Vec2) -> (Vec3, f32) {
     let p = point_on_octahedron(oct);
     let inverse_length = p.length_recip();

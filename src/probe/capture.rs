@@ -4,7 +4,7 @@
 //! [`Surfel`] — enough to compute its outgoing radiance again and again as bounces are added — and of every texel the
 //! emitted radiance and the distance. Traced once; a bounce costs queries only.
 
-use glam::{Vec2, Vec3, Vec3A};
+use glam::{UVec2, Vec2, Vec3, Vec3A};
 use serde::{Deserialize, Serialize};
 
 use super::surface_visibility::Facing;
@@ -173,15 +173,23 @@ impl Capture<'_, '_> {
             surfels: Vec::with_capacity(self.texels() * samples),
             ..Default::default()
         };
-        let strata = Strata::new(samples, self.settings.resolution);
+        let resolution = self.settings.resolution as u32;
+        let strata = Strata::new(samples, resolution);
+        let texel_size = 2.0 / resolution as f32;
+        let corner_of_texel =
+            |texel: u32| UVec2::new(texel % resolution, texel / resolution).as_vec2() * texel_size - 1.0;
         let mut random = Random::new(self.seed, Purpose::Capture, index as u64, 0);
         let mut rays = Vec::with_capacity(samples);
-        for texel in 0..self.texels() {
+        for texel in 0..self.texels() as u32 {
             rays.clear();
-            rays.extend((0..samples).map(|sample| direction_and_density(strata.oct(texel, sample, &mut random))));
+            let corner = corner_of_texel(texel);
+            rays.extend(strata.corners.iter().map(|stratum| {
+                let jitter = Vec2::new(random.uniform(), random.uniform());
+                direction_and_density(corner + stratum + jitter * strata.size)
+            }));
             let sum: f32 = rays.iter().map(|(_, solid_angle)| solid_angle).sum();
             for &(direction, solid_angle) in &rays {
-                let ray = TexelRay { texel: texel as u32, direction, solid_angle, share: solid_angle / sum };
+                let ray = TexelRay { texel, direction, solid_angle, share: solid_angle / sum };
                 self.ray(position, &ray, &emitter_samples, &mut random, &contains, &mut out);
             }
         }
@@ -313,27 +321,19 @@ struct TexelRay {
 
 /// How the samples of a texel are laid out in it.
 struct Strata {
-    columns: usize,
-    /// Texels per side of the map.
-    resolution: usize,
+    /// Of every stratum, relative to the texel's, in the octahedral square.
+    corners: Vec<Vec2>,
     /// Of one stratum in the octahedral square.
     size: Vec2,
 }
 
 impl Strata {
     /// As square as the divisors of `samples` allow.
-    fn new(samples: usize, resolution: usize) -> Strata {
+    fn new(samples: usize, resolution: u32) -> Strata {
         let columns = (1..=samples).take_while(|c| c * c <= samples).filter(|c| samples.is_multiple_of(*c)).last();
         let columns = columns.unwrap_or(1);
         let size = 2.0 / (resolution as f32 * Vec2::new(columns as f32, (samples / columns) as f32));
-        Strata { columns, resolution, size }
-    }
-
-    /// Where a sample of a texel goes, jittered.
-    fn oct(&self, texel: usize, sample: usize, random: &mut Random) -> Vec2 {
-        let stratum = Vec2::new((sample % self.columns) as f32, (sample / self.columns) as f32);
-        let jitter = Vec2::new(random.uniform(), random.uniform());
-        let corner = Vec2::new((texel % self.resolution) as f32, (texel / self.resolution) as f32);
-        corner * (2.0 / self.resolution as f32) + (stratum + jitter) * self.size - 1.0
+        let corner = |sample: usize| Vec2::new((sample % columns) as f32, (sample / columns) as f32) * size;
+        Strata { corners: (0..samples).map(corner).collect(), size }
     }
 }

@@ -30,6 +30,10 @@ const ALL_POINTS: u32 = 8;
 /// lie inside the other wall, and the strip that does not must still be found.
 const SEARCH_POINTS: u32 = 32;
 
+/// Most search points on all triangles of a voxel's side together, as far as each still gets `ALL_POINTS`/2: finely
+/// divided surfaces need no more points than a wall of two triangles does.
+const GROUP_SEARCH_POINTS: u32 = 4 * SEARCH_POINTS;
+
 /// Most voxels per cell and axis: 22³·6 keys fit 16 bits.
 pub const MAX_VOXELS_PER_CELL: u32 = 22;
 
@@ -82,19 +86,37 @@ const MISSED_REACH: u32 = 3;
 /// Points nearer to a voxel's border than this share of its side may use the voxel beyond.
 const STRIP: f32 = 0.25;
 
-/// What the points of one triangle in one voxel see.
+/// One side of a triangle in one voxel. Small, for there are millions and they are sorted.
+#[derive(Debug, Clone, Copy)]
+struct Side {
+    cell: u32,
+    key: u16,
+    /// Whether this is the back of the triangle.
+    is_back: bool,
+    triangle: u32,
+    tally: Tally,
+}
+
+/// What the points of a [`Side`] see.
 #[derive(Debug, Clone, Copy, Default)]
 struct Tally {
-    /// Rays traced.
-    rays: u32,
+    /// Rays traced: at most `SEARCH_POINTS` × 8.
+    rays: u16,
     /// Points that see any probe at all. The others lie inside solids where walls meet, and have no vote.
-    points: u32,
+    points: u8,
     /// Of these, how many see each corner.
-    visible: [u32; 8],
+    visible: [u8; 8],
     /// Whether chance found no point of the triangle in the voxel, only its nearest one, which lies on an edge.
     edge_only: bool,
     /// Whether the outside of a surface faces here (as against the back of one that has only a front).
     outside: bool,
+}
+
+impl Tally {
+    /// Whether points well inside the voxel, on the outside of a surface, see any probe.
+    fn settles(&self) -> bool {
+        self.outside && !self.edge_only && self.points > 0
+    }
 }
 
 impl SurfaceVisibility {
@@ -173,10 +195,10 @@ impl SurfaceVisibility {
         let n = self.voxels_per_cell;
         let range = self.cell_start[cell] as usize..self.cell_start[cell + 1] as usize;
         range.map(move |i| {
-            let (voxel, facing) = (u32::from(self.keys[i]) / 6, u32::from(self.keys[i]) % 6);
+            let facing = u32::from(self.keys[i]) % 6;
             let sign = if facing.is_multiple_of(2) { 1.0 } else { -1.0 };
             Entry {
-                voxel: UVec3::new(voxel % n, voxel / n % n, voxel / (n * n)),
+                voxel: voxel_of_key(self.keys[i], n),
                 facing: Vec3::AXES[facing as usize / 2] * sign,
                 mask: self.masks[i],
                 index: i,
@@ -200,26 +222,28 @@ impl SurfaceVisibility {
         seed: u64,
     ) -> Measured {
         let survey = Survey { scene, tracer, grid, states, positions, n: voxels_per_cell, seed };
-        let mut entries: Vec<(u32, u16, Tally)> =
+        let mut sides: Vec<Side> =
             (0..scene.mesh.triangles.len() as u32).into_par_iter().flat_map_iter(|t| survey.triangle(t)).collect();
         // Sums of counts do not depend on the order, so neither does the result.
-        entries.par_sort_unstable_by_key(|e| (e.0, e.1));
-        let rays = entries.iter().map(|e| u64::from(e.2.rays)).sum();
+        sides.par_sort_unstable_by_key(|e| (e.cell, e.key));
+        let mut rays: u64 = sides.iter().map(|e| u64::from(e.tally.rays)).sum();
+        let mut groups: Vec<&mut [Side]> = sides.chunk_by_mut(|a, b| (a.cell, a.key) == (b.cell, b.key)).collect();
+        rays += groups.par_iter_mut().map(|group| survey.search(group)).sum::<u64>();
         let mut table = SurfaceVisibility { voxels_per_cell, ..Default::default() };
         let mut fronts = Vec::new();
         let cells = grid.cell_count();
-        let mut groups = entries.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).peekable();
+        let mut groups = groups.into_iter().peekable();
         for cell in 0..cells as u32 {
             table.cell_start.push(table.keys.len() as u32);
-            while let Some(group) = groups.next_if(|g| g[0].0 == cell) {
+            while let Some(group) = groups.next_if(|g| g[0].cell == cell) {
                 let mask = majority(group);
                 // The inside of a solid, or a voxel that an edge merely touches: nothing there asks.
-                if mask == 0 && !group.iter().any(|e| e.2.outside && !e.2.edge_only) {
+                if mask == 0 && !group.iter().any(|e| e.tally.outside && !e.tally.edge_only) {
                     continue;
                 }
-                table.keys.push(group[0].1);
+                table.keys.push(group[0].key);
                 table.masks.push(mask);
-                fronts.push(group.iter().any(|e| e.2.outside));
+                fronts.push(group.iter().any(|e| e.tally.outside));
             }
         }
         table.cell_start.push(table.keys.len() as u32);
@@ -228,12 +252,12 @@ impl SurfaceVisibility {
 }
 
 /// Corners that most points see; points on edges vote only where there are no others.
-fn majority(group: &[(u32, u16, Tally)]) -> u8 {
-    let only_edges = group.iter().all(|e| e.2.edge_only || e.2.points == 0);
-    let voters = || group.iter().map(|e| &e.2).filter(|t| only_edges || !t.edge_only);
-    let points: u32 = voters().map(|t| t.points).sum();
+fn majority(group: &[Side]) -> u8 {
+    let only_edges = group.iter().all(|e| e.tally.edge_only || e.tally.points == 0);
+    let voters = || group.iter().map(|e| &e.tally).filter(|t| only_edges || !t.edge_only);
+    let points: u32 = voters().map(|t| u32::from(t.points)).sum();
     (0..8).fold(0, |mask, i| {
-        let visible: u32 = voters().map(|t| t.visible[i]).sum();
+        let visible: u32 = voters().map(|t| u32::from(t.visible[i])).sum();
         mask | u8::from(2 * visible > points) << i
     })
 }
@@ -246,6 +270,12 @@ fn key(voxel: UVec3, facing: Facing, n: u32) -> u16 {
     ((voxel.x + n * (voxel.y + n * voxel.z)) * 6) as u16 + u16::from(facing.0)
 }
 
+/// Voxel within its cell; with [`Facing`] the inverse of [`key`].
+fn voxel_of_key(key: u16, n: u32) -> UVec3 {
+    let v = u32::from(key) / 6;
+    UVec3::new(v % n, v / n % n, v / (n * n))
+}
+
 /// Main direction of a normal: 2·axis + (1 where negative).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Facing(u8);
@@ -255,14 +285,15 @@ impl Facing {
         let axis = normal.abs().max_position();
         Facing(2 * axis as u8 + u8::from(normal[axis] < 0.0))
     }
+
+    fn opposite(self) -> Facing {
+        Facing(self.0 ^ 1)
+    }
 }
 
 /// The entry that faces the same way in the nearest voxel, at most `reach` voxels away.
 fn nearest_entry(keys: &[u16], wanted: u16, n: u32, reach: u32) -> Option<usize> {
-    let voxel = |key: u16| {
-        let v = u32::from(key) / 6;
-        UVec3::new(v % n, v / n % n, v / (n * n)).as_ivec3()
-    };
+    let voxel = |key: u16| voxel_of_key(key, n).as_ivec3();
     let target = voxel(wanted);
     (0..keys.len())
         .filter(|&i| keys[i] % 6 == wanted % 6)
@@ -296,7 +327,7 @@ impl Survey<'_> {
     }
 
     /// Tallies of both sides of a triangle, in every voxel that it meets.
-    fn triangle(&self, triangle: u32) -> Vec<(u32, u16, Tally)> {
+    fn triangle(&self, triangle: u32) -> Vec<Side> {
         let mut out = Vec::new();
         let corners = self.mesh().corners(TriangleIndex(triangle));
         let in_grid = corners.map(|p| self.grid.grid_from_scene(p));
@@ -316,7 +347,7 @@ impl Survey<'_> {
                     let base = UVec3::new(x, y, z);
                     let local = in_grid.map(|c| c - base.as_vec3());
                     if triangle_meets_box(local.map(|c| c - 0.5), Vec3::splat(0.5 + VOXEL_MARGIN / self.n as f32)) {
-                        self.cell(triangle, &corners, &local, base, &mut out);
+                        self.cell(triangle, &local, base, &mut out);
                     }
                 }
             }
@@ -325,28 +356,18 @@ impl Survey<'_> {
     }
 
     /// One triangle in one cell; `local` are its corners in units of the cell.
-    fn cell(
-        &self,
-        triangle: u32,
-        corners: &[Vec3; 3],
-        local: &[Vec3; 3],
-        base: UVec3,
-        out: &mut Vec<(u32, u16, Tally)>,
-    ) {
-        let active = active_corners(self.grid, self.states, base);
-        if active == 0 {
+    fn cell(&self, triangle: u32, local: &[Vec3; 3], base: UVec3, out: &mut Vec<Side>) {
+        if active_corners(self.grid, self.states, base) == 0 {
             return;
         }
         let n = self.n as f32;
         let scaled = local.map(|c| c * n);
         let low = scaled[0].min(scaled[1]).min(scaled[2]) - VOXEL_MARGIN;
         let high = scaled[0].max(scaled[1]).max(scaled[2]) + VOXEL_MARGIN;
-        let (low, high) = (low.floor().max(Vec3::ZERO).as_uvec3(), high.floor().max(Vec3::ZERO).as_uvec3());
         let last = UVec3::splat(self.n - 1);
-        let (low, high) = (low.min(last), high.min(last));
-        let outward = self.mesh().geometric_normal(TriangleIndex(triangle));
-        let double_sided = self.scene.material(TriangleIndex(triangle)).double_sided;
-        let cell_index = self.grid.cell_index(base) as u32;
+        let (low, high) = (low.max(Vec3::ZERO).as_uvec3().min(last), high.max(Vec3::ZERO).as_uvec3().min(last));
+        let front = Facing::of(self.mesh().geometric_normal(TriangleIndex(triangle)));
+        let cell = self.grid.cell_index(base) as u32;
         for z in low.z..=high.z {
             for y in low.y..=high.y {
                 for x in low.x..=high.x {
@@ -356,43 +377,66 @@ impl Survey<'_> {
                     if !triangle_meets_box(around, Vec3::splat(0.5 + VOXEL_MARGIN)) {
                         continue;
                     }
-                    let stream = u64::from(cell_index) << 16 | u64::from(key(voxel, Facing(0), self.n));
-                    for (side, normal) in [(0u64, outward), (1, -outward)] {
-                        let mut random =
-                            Random::new(self.seed, Purpose::SurfaceVisibility, stream, 2 * u64::from(triangle) + side);
-                        let outside = side == 0 || double_sided;
-                        let tally = self.tally(corners, &around, normal, outside, base, active, &mut random);
-                        out.push((cell_index, key(voxel, Facing::of(normal), self.n), tally));
+                    for (is_back, facing) in [(false, front), (true, front.opposite())] {
+                        let key = key(voxel, facing, self.n);
+                        let mut side = Side { cell, key, is_back, triangle, tally: Tally::default() };
+                        side.tally = self.tally(&side, base, &around, FIRST_POINTS);
+                        out.push(side);
                     }
                 }
             }
         }
     }
 
-    #[allow(clippy::too_many_arguments)]
-    /// Rays from points of the triangle within a voxel; `around` are its corners relative to the voxel's centre.
-    fn tally(
-        &self,
-        corners: &[Vec3; 3],
-        around: &[Vec3; 3],
-        normal: Vec3,
-        outside: bool,
-        base: UVec3,
-        active: u8,
-        random: &mut Random,
-    ) -> Tally {
+    /// Looks again, with more points, where nothing on the outside of the surfaces of a voxel has seen a probe yet.
+    /// Returns the number of rays.
+    fn search(&self, group: &mut [Side]) -> u64 {
+        if group.iter().any(|e| e.tally.settles()) {
+            return 0;
+        }
+        let mut rays = 0;
+        let base = self.grid.cell_base(group[0].cell as usize);
+        let centre = base.as_vec3() + (voxel_of_key(group[0].key, self.n).as_vec3() + 0.5) / self.n as f32;
+        let unseen = |e: &Side| e.tally.outside && !e.tally.edge_only && e.tally.rays > 0;
+        let count = group.iter().filter(|e| unseen(e)).count().max(1) as u32;
+        let points = (GROUP_SEARCH_POINTS / count).clamp(ALL_POINTS / 2, SEARCH_POINTS);
+        for side in group.iter_mut().filter(|e| unseen(e)) {
+            let corners = self.mesh().corners(TriangleIndex(side.triangle));
+            let around = corners.map(|p| (self.grid.grid_from_scene(p) - centre) * self.n as f32);
+            side.tally = self.tally(side, base, &around, points);
+            rays += u64::from(side.tally.rays);
+        }
+        rays
+    }
+
+    /// Rays from points of a triangle within a voxel; `around` are its corners relative to the voxel's centre. Up to
+    /// `search` points are tried until one sees any probe.
+    fn tally(&self, side: &Side, base: UVec3, around: &[Vec3; 3], search: u32) -> Tally {
+        let triangle = TriangleIndex(side.triangle);
+        let corners = &self.mesh().corners(triangle);
+        let front = self.mesh().geometric_normal(triangle);
+        let normal = if side.is_back { -front } else { front };
+        let active = active_corners(self.grid, self.states, base);
+        let stream = u64::from(side.cell) << 16 | u64::from(side.key);
+        let mut random = Random::new(
+            self.seed,
+            Purpose::SurfaceVisibility,
+            stream,
+            2 * u64::from(side.triangle) + u64::from(side.is_back),
+        );
+        let outside = !side.is_back || self.scene.material(triangle).double_sided;
         let mut tally = Tally { outside, ..Tally::default() };
         for tried in 0.. {
             let enough = match tally.points {
                 _ if tally.edge_only => 1,
-                0 if outside => SEARCH_POINTS,
+                0 => search,
                 points if tally.visible.iter().all(|&v| v == 0 || v == points) => FIRST_POINTS,
                 _ => ALL_POINTS,
             };
             if tried >= enough {
                 break;
             }
-            let (barycentric, inside) = point_in_voxel(around, random);
+            let (barycentric, inside) = point_in_voxel(around, &mut random);
             tally.edge_only |= !inside;
             let position =
                 corners[0] + (corners[1] - corners[0]) * barycentric.x + (corners[2] - corners[0]) * barycentric.y;
@@ -408,10 +452,12 @@ impl Survey<'_> {
                     continue;
                 }
                 tally.rays += 1;
-                seen |= u8::from(!self.tracer.occluded(Ray::segment(probe, origin, random.bits()))) << corner;
+                // From the surface: most rays that are blocked are blocked near it, where walls and solids meet, and
+                // Embree looks there first.
+                seen |= u8::from(!self.tracer.occluded(Ray::segment(origin, probe, random.bits()))) << corner;
             }
-            tally.points += u32::from(seen != 0);
-            (0..8).for_each(|corner| tally.visible[corner] += u32::from(seen >> corner & 1));
+            tally.points += u8::from(seen != 0);
+            (0..8).for_each(|corner| tally.visible[corner] += seen >> corner & 1);
         }
         tally
     }

@@ -86,7 +86,7 @@ fn screen_box(camera: &Camera, centre: Vec3, radius: f32, width: u32, height: u3
     let to_pixel = |ndc: Vec2| (Vec2::new(ndc.x, -ndc.y) * 0.5 + 0.5) * size;
     let a = to_pixel(middle + Vec2::new(-reach.x, reach.y)).max(Vec2::ZERO).floor();
     let b = to_pixel(middle + Vec2::new(reach.x, -reach.y)).min(size).ceil();
-    (a.x < b.x && a.y < b.y).then(|| ((a.x as u32, a.y as u32), (b.x as u32, b.y as u32)))
+    (a.x < b.x && a.y < b.y).then_some(((a.x as u32, a.y as u32), (b.x as u32, b.y as u32)))
 }
 
 /// Distance along the unit direction to the front of a sphere.

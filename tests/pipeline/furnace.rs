@@ -45,9 +45,9 @@ fn check_means(files: &[ProbeFile], probes: &[usize], expected: [f64; 3], what: 
 /// Texels' means over the files within five standard errors and the solver's tolerance.
 fn check_texels(files: &[ProbeFile], probes: &[usize], expected: [f64; 3], what: &str) {
     let largest = expected.iter().copied().fold(0.0, f64::max);
-    for c in 0..3 {
+    for (c, expected) in expected.into_iter().enumerate() {
         let samples = Samples::of(files, probes, c);
-        let exact = vec![expected[c]; samples.values[0].len()];
+        let exact = vec![expected; samples.values[0].len()];
         samples.check(&exact, SOLVER_FLOOR * largest, what);
     }
 }

@@ -23,6 +23,7 @@ use crate::probe::placement::{Placement, ProbeState, Settler, place};
 use crate::probe::query::VisibilitySettings;
 use crate::probe::solver::{Captures, Solution, Solver};
 use crate::probe::surface_visibility::SurfaceVisibility;
+use crate::probe::survey::Measured;
 use crate::probe::{Grid, Volume};
 use crate::progress::Progress;
 use crate::report::bake::{Numerics, Rays, Times};
@@ -111,8 +112,7 @@ pub fn prepare<'w, 's>(
         voxels.map(|voxels| {
             let (states, positions) = (&placement.states, &placement.positions);
             let seed = circumstances.seed;
-            let measured =
-                SurfaceVisibility::measure(world.scene, &world.tracer, &grid, states, positions, voxels, seed);
+            let measured = Measured::survey(world.scene, &world.tracer, &grid, states, positions, voxels, seed);
             survey_rays += measured.rays;
             measured
         })

@@ -1,6 +1,6 @@
 //! Probes go where surfaces need them.
 //!
-//! The survey of the surfaces ([`super::surface_visibility`]) tells which probes no surface sees — they lie below a
+//! The survey of the surfaces ([`super::survey`]) tells which probes no surface sees — they lie below a
 //! floor, behind a wall, in a cupboard — and which surfaces see no probe. Each such probe is moved next to such a
 //! surface within its own cells; what still is not seen afterwards need not be baked. Surfaces that see none of their
 //! eight probes even then are given one from the cells around.
@@ -10,7 +10,8 @@ use rayon::prelude::*;
 
 use super::grid::{Grid, ProbeIndex};
 use super::placement::{Placement, ProbeState, Settler};
-use super::surface_visibility::{Entry, Measured, SurfaceVisibility};
+use super::surface_visibility::{Entry, SurfaceVisibility};
+use super::survey::Measured;
 use crate::scene::Mesh;
 use crate::trace::{Ray, Tracer};
 

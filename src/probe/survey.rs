@@ -1,0 +1,330 @@
+//! The survey that fills a [`SurfaceVisibility`]: rays from points of every surface to the eight probes of its cell.
+
+use glam::{UVec3, Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::grid::Grid;
+use super::overlap::triangle_meets_box;
+use super::placement::ProbeState;
+use super::surface_visibility::{Facing, SurfaceVisibility, active_corners, key, voxel_of_key};
+use crate::math::random::{Purpose, Random};
+use crate::scene::{Mesh, Scene, TriangleIndex};
+use crate::trace::offset::ray_offset;
+use crate::trace::{Ray, Tracer};
+
+/// Points tried on a surface within one voxel, at first and in all where these disagree.
+const FIRST_POINTS: u32 = 2;
+const ALL_POINTS: u32 = 8;
+
+/// Points tried on the outside of a surface until one sees any probe: where walls meet, most of a voxel's surface may
+/// lie inside the other wall, and the strip that does not must still be found.
+const SEARCH_POINTS: u32 = 32;
+
+/// Most search points on all triangles of a voxel's side together, as far as each still gets `ALL_POINTS`/2: finely
+/// divided surfaces need no more points than a wall of two triangles does.
+const GROUP_SEARCH_POINTS: u32 = 4 * SEARCH_POINTS;
+
+/// A table with what is known beside it while baking.
+#[derive(Debug, Clone)]
+pub struct Measured {
+    pub table: SurfaceVisibility,
+    /// Per entry: whether the front of a surface, or a surface that has no back, faces there.
+    pub fronts: Vec<bool>,
+    pub rays: u64,
+}
+
+/// Voxels are taken larger by this share on every side when surfaces are sorted into them, so that a surface on the
+/// border of two is known in both, on whichever side of it rounding puts the point that asks.
+const VOXEL_MARGIN: f32 = 0.03;
+
+/// One side of a triangle in one voxel. Small, for there are millions and they are sorted.
+#[derive(Debug, Clone, Copy)]
+struct Side {
+    cell: u32,
+    key: u16,
+    /// Whether this is the back of the triangle.
+    is_back: bool,
+    triangle: u32,
+    tally: Tally,
+}
+
+/// What the points of a [`Side`] see.
+#[derive(Debug, Clone, Copy, Default)]
+struct Tally {
+    /// Rays traced: at most `SEARCH_POINTS` × 8.
+    rays: u16,
+    /// Points that see any probe at all. The others lie inside solids where walls meet, and have no vote.
+    points: u8,
+    /// Of these, how many see each corner.
+    visible: [u8; 8],
+    /// Whether chance found no point of the triangle in the voxel, only its nearest one, which lies on an edge.
+    edge_only: bool,
+    /// Whether the outside of a surface faces here (as against the back of one that has only a front).
+    outside: bool,
+}
+
+impl Tally {
+    /// Whether points well inside the voxel, on the outside of a surface, see any probe.
+    fn settles(&self) -> bool {
+        self.outside && !self.edge_only && self.points > 0
+    }
+}
+
+impl Measured {
+    /// Measures every surface within the grid's hull.
+    pub fn survey(
+        scene: &Scene,
+        tracer: &Tracer,
+        grid: &Grid,
+        states: &[ProbeState],
+        positions: &[Vec3],
+        voxels_per_cell: u32,
+        seed: u64,
+    ) -> Measured {
+        let survey = Survey { scene, tracer, grid, states, positions, n: voxels_per_cell, seed };
+        let mut sides: Vec<Side> =
+            (0..scene.mesh.triangles.len() as u32).into_par_iter().flat_map_iter(|t| survey.triangle(t)).collect();
+        // Sums of counts do not depend on the order, so neither does the result.
+        sides.par_sort_unstable_by_key(|e| (e.cell, e.key));
+        let mut rays: u64 = sides.iter().map(|e| u64::from(e.tally.rays)).sum();
+        let mut groups: Vec<&mut [Side]> = sides.chunk_by_mut(|a, b| (a.cell, a.key) == (b.cell, b.key)).collect();
+        rays += groups.par_iter_mut().map(|group| survey.search(group)).sum::<u64>();
+        let mut table = SurfaceVisibility { voxels_per_cell, ..Default::default() };
+        let mut fronts = Vec::new();
+        let cells = grid.cell_count();
+        let mut groups = groups.into_iter().peekable();
+        for cell in 0..cells as u32 {
+            table.cell_start.push(table.keys.len() as u32);
+            while let Some(group) = groups.next_if(|g| g[0].cell == cell) {
+                let mask = majority(group);
+                // The inside of a solid, or a voxel that an edge merely touches: nothing there asks.
+                if mask == 0 && !group.iter().any(|e| e.tally.outside && !e.tally.edge_only) {
+                    continue;
+                }
+                table.keys.push(group[0].key);
+                table.masks.push(mask);
+                fronts.push(group.iter().any(|e| e.tally.outside));
+            }
+        }
+        table.cell_start.push(table.keys.len() as u32);
+        Measured { table, fronts, rays }
+    }
+}
+
+/// Corners that most points see; points on edges vote only where there are no others.
+fn majority(group: &[Side]) -> u8 {
+    let only_edges = group.iter().all(|e| e.tally.edge_only || e.tally.points == 0);
+    let voters = || group.iter().map(|e| &e.tally).filter(|t| only_edges || !t.edge_only);
+    let points: u32 = voters().map(|t| u32::from(t.points)).sum();
+    (0..8).fold(0, |mask, i| {
+        let visible: u32 = voters().map(|t| u32::from(t.visible[i])).sum();
+        mask | u8::from(2 * visible > points) << i
+    })
+}
+
+struct Survey<'a> {
+    scene: &'a Scene,
+    tracer: &'a Tracer<'a>,
+    grid: &'a Grid,
+    states: &'a [ProbeState],
+    positions: &'a [Vec3],
+    n: u32,
+    seed: u64,
+}
+
+impl Survey<'_> {
+    fn mesh(&self) -> &Mesh {
+        &self.scene.mesh
+    }
+
+    /// Tallies of both sides of a triangle, in every voxel that it meets.
+    fn triangle(&self, triangle: u32) -> Vec<Side> {
+        let mut out = Vec::new();
+        let corners = self.mesh().corners(TriangleIndex(triangle));
+        let in_grid = corners.map(|p| self.grid.grid_from_scene(p));
+        let cells = self.grid.cells();
+        let margin = VOXEL_MARGIN / self.n as f32;
+        let low = in_grid[0].min(in_grid[1]).min(in_grid[2]) - margin;
+        let high = in_grid[0].max(in_grid[1]).max(in_grid[2]) + margin;
+        if high.cmplt(Vec3::ZERO).any() || low.cmpgt(cells.as_vec3()).any() {
+            return out;
+        }
+        let last = cells - UVec3::ONE;
+        let first = low.floor().max(Vec3::ZERO).as_uvec3().min(last);
+        let past = high.floor().max(Vec3::ZERO).as_uvec3().min(last);
+        for z in first.z..=past.z {
+            for y in first.y..=past.y {
+                for x in first.x..=past.x {
+                    let base = UVec3::new(x, y, z);
+                    let local = in_grid.map(|c| c - base.as_vec3());
+                    if triangle_meets_box(local.map(|c| c - 0.5), Vec3::splat(0.5 + VOXEL_MARGIN / self.n as f32)) {
+                        self.cell(triangle, &local, base, &mut out);
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// One triangle in one cell; `local` are its corners in units of the cell.
+    fn cell(&self, triangle: u32, local: &[Vec3; 3], base: UVec3, out: &mut Vec<Side>) {
+        if active_corners(self.grid, self.states, base) == 0 {
+            return;
+        }
+        let n = self.n as f32;
+        let scaled = local.map(|c| c * n);
+        let low = scaled[0].min(scaled[1]).min(scaled[2]) - VOXEL_MARGIN;
+        let high = scaled[0].max(scaled[1]).max(scaled[2]) + VOXEL_MARGIN;
+        let last = UVec3::splat(self.n - 1);
+        let (low, high) = (low.max(Vec3::ZERO).as_uvec3().min(last), high.max(Vec3::ZERO).as_uvec3().min(last));
+        let front = Facing::of(self.mesh().geometric_normal(TriangleIndex(triangle)));
+        let cell = self.grid.cell_index(base) as u32;
+        for z in low.z..=high.z {
+            for y in low.y..=high.y {
+                for x in low.x..=high.x {
+                    let voxel = UVec3::new(x, y, z);
+                    let centre = voxel.as_vec3() + 0.5;
+                    let around = scaled.map(|c| c - centre);
+                    if !triangle_meets_box(around, Vec3::splat(0.5 + VOXEL_MARGIN)) {
+                        continue;
+                    }
+                    for (is_back, facing) in [(false, front), (true, front.opposite())] {
+                        let key = key(voxel, facing, self.n);
+                        let mut side = Side { cell, key, is_back, triangle, tally: Tally::default() };
+                        side.tally = self.tally(&side, base, &around, FIRST_POINTS);
+                        out.push(side);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Looks again, with more points, where nothing on the outside of the surfaces of a voxel has seen a probe yet.
+    /// Returns the number of rays.
+    fn search(&self, group: &mut [Side]) -> u64 {
+        if group.iter().any(|e| e.tally.settles()) {
+            return 0;
+        }
+        let mut rays = 0;
+        let base = self.grid.cell_base(group[0].cell as usize);
+        let centre = base.as_vec3() + (voxel_of_key(group[0].key, self.n).as_vec3() + 0.5) / self.n as f32;
+        let unseen = |e: &Side| e.tally.outside && !e.tally.edge_only && e.tally.rays > 0;
+        let count = group.iter().filter(|e| unseen(e)).count().max(1) as u32;
+        let points = (GROUP_SEARCH_POINTS / count).clamp(ALL_POINTS / 2, SEARCH_POINTS);
+        for side in group.iter_mut().filter(|e| unseen(e)) {
+            let corners = self.mesh().corners(TriangleIndex(side.triangle));
+            let around = corners.map(|p| (self.grid.grid_from_scene(p) - centre) * self.n as f32);
+            side.tally = self.tally(side, base, &around, points);
+            rays += u64::from(side.tally.rays);
+        }
+        rays
+    }
+
+    /// Rays from points of a triangle within a voxel; `around` are its corners relative to the voxel's centre. Up to
+    /// `search` points are tried until one sees any probe.
+    fn tally(&self, side: &Side, base: UVec3, around: &[Vec3; 3], search: u32) -> Tally {
+        let triangle = TriangleIndex(side.triangle);
+        let corners = &self.mesh().corners(triangle);
+        let front = self.mesh().geometric_normal(triangle);
+        let normal = if side.is_back { -front } else { front };
+        let active = active_corners(self.grid, self.states, base);
+        let stream = u64::from(side.cell) << 16 | u64::from(side.key);
+        let mut random = Random::new(
+            self.seed,
+            Purpose::SurfaceVisibility,
+            stream,
+            2 * u64::from(side.triangle) + u64::from(side.is_back),
+        );
+        let outside = !side.is_back || self.scene.material(triangle).double_sided;
+        let mut tally = Tally { outside, ..Tally::default() };
+        for tried in 0.. {
+            let enough = match tally.points {
+                _ if tally.edge_only => 1,
+                0 => search,
+                points if tally.visible.iter().all(|&v| v == 0 || v == points) => FIRST_POINTS,
+                _ => ALL_POINTS,
+            };
+            if tried >= enough {
+                break;
+            }
+            let (barycentric, inside) = point_in_voxel(around, &mut random);
+            tally.edge_only |= !inside;
+            let position =
+                corners[0] + (corners[1] - corners[0]) * barycentric.x + (corners[2] - corners[0]) * barycentric.y;
+            let origin = position + normal * ray_offset(corners);
+            let mut seen = 0u8;
+            for corner in 0..8 {
+                if active >> corner & 1 == 0 {
+                    continue;
+                }
+                let probe = self.positions[self.grid.corner(base, corner).0 as usize];
+                // A probe behind the surface is hidden by the surface itself.
+                if (probe - origin).dot(normal) <= 0.0 {
+                    continue;
+                }
+                tally.rays += 1;
+                // From the surface: most rays that are blocked are blocked near it, where walls and solids meet, and
+                // Embree looks there first.
+                seen |= u8::from(!self.tracer.occluded(Ray::segment(origin, probe, random.bits()))) << corner;
+            }
+            tally.points += u8::from(seen != 0);
+            (0..8).for_each(|corner| tally.visible[corner] += seen >> corner & 1);
+        }
+        tally
+    }
+}
+
+/// Barycentric coordinates of a random point of a triangle inside the unit box around the origin, and whether there
+/// is one; where chance finds none (slivers, corners), of the triangle's point nearest the box's centre.
+fn point_in_voxel(around: &[Vec3; 3], random: &mut Random) -> (Vec2, bool) {
+    /// Tries before a triangle's share of a voxel counts as a sliver.
+    const TRIES: usize = 8;
+    let (e1, e2) = (around[1] - around[0], around[2] - around[0]);
+    let normal = e1.cross(e2);
+    let axis = normal.abs().max_position();
+    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+    let determinant = e1[u] * e2[v] - e1[v] * e2[u];
+    for _ in 0..TRIES {
+        let p = Vec2::new(random.uniform() - 0.5 - around[0][u], random.uniform() - 0.5 - around[0][v]);
+        let b = Vec2::new(p.x * e2[v] - p.y * e2[u], e1[u] * p.y - e1[v] * p.x) / determinant;
+        let along_axis = around[0][axis] + e1[axis] * b.x + e2[axis] * b.y;
+        if b.x >= 0.0 && b.y >= 0.0 && b.x + b.y <= 1.0 && along_axis.abs() <= 0.5 + VOXEL_MARGIN {
+            return (b, true);
+        }
+    }
+    (nearest_to_origin(around), false)
+}
+
+/// Barycentric coordinates of the point of a triangle nearest the origin (Ericson, *Real-Time Collision Detection*,
+/// 2005, section 5.1.5).
+fn nearest_to_origin(t: &[Vec3; 3]) -> Vec2 {
+    let (ab, ac, ap) = (t[1] - t[0], t[2] - t[0], -t[0]);
+    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return Vec2::ZERO;
+    }
+    let bp = -t[1];
+    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return Vec2::X;
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return Vec2::new(d1 / (d1 - d3), 0.0);
+    }
+    let cp = -t[2];
+    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return Vec2::Y;
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return Vec2::new(0.0, d2 / (d2 - d6));
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
+        let w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return Vec2::new(1.0 - w, w);
+    }
+    Vec2::new(vb, vc) / (va + vb + vc)
+}

@@ -199,7 +199,8 @@ impl Settler<'_, '_> {
             let (mut position, mut around) = best;
             for _ in 0..MAX_MOVES {
                 let Some(moved) = self.better(position, &around) else { break };
-                if !(moved.distance(grid_point) <= MAX_MOVE * self.spacing_m) {
+                let is_near = moved.distance(grid_point) <= MAX_MOVE * self.spacing_m;
+                if !is_near {
                     break;
                 }
                 (position, around) = (moved, self.look(moved));

@@ -26,6 +26,7 @@ use crate::probe::surface_visibility::SurfaceVisibility;
 use crate::probe::{Grid, Volume};
 use crate::progress::Progress;
 use crate::report::bake::{Numerics, Rays, Times};
+use crate::scene::Mesh;
 
 /// Hits this far outside the hull of the probes, in spacings, still count as inside: rounding of the bounds.
 const HULL_TOLERANCE: f32 = 1e-3;
@@ -131,7 +132,7 @@ pub fn prepare<'w, 's>(
     if let (Some(table), VisibilitySettings::Surface { .. }) = (&surface, config.query.visibility)
         && !placement_settings.keep_unsampled
     {
-        retire_unseen(&grid, &mut placement, table);
+        retire_unseen(&world.scene.mesh, &grid, &mut placement, table);
     }
     bar.finish_and_clear();
     let plan = Plan::new(world, config, &grid, &placement, surface.as_ref());
@@ -141,8 +142,8 @@ pub fn prepare<'w, 's>(
 }
 
 /// Active probes that no surface sees are not worth baking.
-fn retire_unseen(grid: &Grid, placement: &mut Placement, table: &SurfaceVisibility) {
-    let mut seen = need::seen_probes(grid, placement, table, |_| true);
+fn retire_unseen(mesh: &Mesh, grid: &Grid, placement: &mut Placement, table: &SurfaceVisibility) {
+    let mut seen = need::seen_probes(mesh, grid, placement, table, |_| true);
     table.far.iter().for_each(|&(_, probe)| seen[probe as usize] = true);
     for (state, seen) in placement.states.iter_mut().zip(seen) {
         if *state == ProbeState::Active && !seen {

@@ -50,7 +50,9 @@ impl Plan {
             glossy(scene),
             unsampled(config, placement),
         ];
-        let blocked = survey.is_none_or(|s| !s.all_visible(grid, &placement.states));
+        // Of surfaces beyond the probes' hull the survey knows nothing.
+        let surveyed = grid.covers(&scene.mesh);
+        let blocked = survey.is_none_or(|s| !surveyed || !s.all_visible(grid, &placement.states));
         let visibility = blocked && config.query.visibility != VisibilitySettings::None;
         lines.push(visibility_line(config, grid, survey, visibility));
         if config.plan == PlanMode::KeepEverything {

@@ -159,7 +159,7 @@ fn report(
 ) -> BakeReport {
     let probes = baked.volume.states.len();
     let traced = (baked.rays.primary + baked.rays.shadow) as f64;
-    let irradiance = layout::irradiance_bytes(&config.filter, &config.encoding) as f64;
+    let irradiance = layout::irradiance_bytes(&config.filter, &config.encoding, config.placement.relocate) as f64;
     let visibility = layout::visibility_bytes(
         config.query.visibility,
         &config.filter,

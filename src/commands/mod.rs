@@ -78,7 +78,7 @@ fn load_scene(path: &Path, trace: &TraceArgs, config: &Config, console: &Console
     let collapse_constant_images = config.plan == crate::config::PlanMode::LeaveOut;
     let scene = scene::load(path, &LoadOptions { environment, collapse_constant_images, ..Default::default() })?;
     for warning in &scene.warnings {
-        console.warn(warning);
+        console.warn(format!("{}: {warning}", path.display()));
     }
     Ok(scene)
 }

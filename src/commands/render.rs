@@ -137,7 +137,7 @@ fn runtime_bytes(probes: &ProbeFile, config: &Config) -> f64 {
         _ if probes.plan["visibility"] == serde_json::Value::Bool(false) => VisibilitySettings::None,
         visibility => visibility,
     };
-    layout::irradiance_bytes(&config.filter, &config.encoding) as f64
+    layout::irradiance_bytes(&config.filter, &config.encoding, config.placement.relocate) as f64
         + layout::visibility_bytes(visibility, &config.filter, &config.encoding, surface, count)
 }
 

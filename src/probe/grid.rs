@@ -5,7 +5,7 @@
 use glam::{DVec3, UVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::scene::Scene;
+use crate::scene::{Mesh, Scene};
 
 /// Index of a probe in the file's tensors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -193,6 +193,17 @@ impl Grid {
     pub fn is_within(&self, position: Vec3) -> bool {
         let g = self.grid_from_scene(position);
         g.cmpge(Vec3::ZERO).all() && g.cmple((self.divisions - UVec3::ONE).as_vec3()).all()
+    }
+
+    /// Whether the probes' hull covers all of a mesh; surfaces beyond it use the cells at its rim.
+    pub fn covers(&self, mesh: &Mesh) -> bool {
+        mesh.bounds().is_none_or(|(low, high)| self.is_within(low) && self.is_within(high))
+    }
+
+    /// Whether a probe lies at the rim of the grid.
+    pub fn is_at_rim(&self, probe: ProbeIndex) -> bool {
+        let coordinate = self.coordinate(probe);
+        coordinate.cmpeq(UVec3::ZERO).any() || coordinate.cmpeq(self.divisions - UVec3::ONE).any()
     }
 
     /// The cell of a point; points outside use the nearest cell, at its face.

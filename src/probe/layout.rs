@@ -11,10 +11,14 @@ const DISTANCE_SCALE_BYTES: usize = 4;
 /// `state`, u8 per probe.
 const STATE_BYTES: usize = 1;
 
-/// Bytes of one probe's irradiance map and state.
-pub fn irradiance_bytes(filter: &FilterSettings, encoding: &EncodingSettings) -> usize {
+/// `position`, three f32; without relocation it follows from the grid.
+const POSITION_BYTES: usize = 12;
+
+/// Bytes of one probe's irradiance map, state and position.
+pub fn irradiance_bytes(filter: &FilterSettings, encoding: &EncodingSettings, relocated: bool) -> usize {
     let side = filter.irradiance_resolution + 2 * encoding.border;
-    side * side * encoding.irradiance.bytes_per_texel() + STATE_BYTES
+    let position = if relocated { POSITION_BYTES } else { 0 };
+    side * side * encoding.irradiance.bytes_per_texel() + STATE_BYTES + position
 }
 
 /// Bytes per probe of what the method stores about visibility. `surface_bytes` is the whole table's size.

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::grid::{Grid, ProbeIndex};
 use super::placement::{Placement, ProbeState, Settler};
 use super::surface_visibility::{Entry, Measured, SurfaceVisibility};
+use crate::scene::Mesh;
 use crate::trace::{Ray, Tracer};
 
 /// How far from a surface in need a probe is put, in spacings; half the free space where that is less.
@@ -29,14 +30,17 @@ struct Need {
     normal: Vec3,
 }
 
-/// Which probes any surface sees that `counts`, by its index in the table.
+/// Which probes any surface sees that `counts`, by its index in the table. Surfaces beyond the probes' hull are not
+/// surveyed: where there are any, the probes at the rim count as seen.
 pub fn seen_probes(
+    mesh: &Mesh,
     grid: &Grid,
     placement: &Placement,
     table: &SurfaceVisibility,
     counts: impl Fn(usize) -> bool,
 ) -> Vec<bool> {
-    let mut seen = vec![false; grid.probe_count()];
+    let rim = !grid.covers(mesh);
+    let mut seen: Vec<bool> = (0..grid.probe_count()).map(|p| rim && grid.is_at_rim(ProbeIndex(p as u32))).collect();
     for cell in 0..grid.cell_count() {
         let base = grid.cell_base(cell);
         let union = table.entries(cell).filter(|e| counts(e.index)).fold(0, |union, entry| union | entry.mask);
@@ -53,7 +57,7 @@ pub fn seen_probes(
 pub fn relocate(settler: &Settler, grid: &Grid, placement: &mut Placement, survey: &Measured) -> usize {
     let table = &survey.table;
     // A probe under the floor may see the floor's back; no one else does.
-    let seen = seen_probes(grid, placement, table, |entry| survey.fronts[entry]);
+    let seen = seen_probes(&settler.world.scene.mesh, grid, placement, table, |entry| survey.fronts[entry]);
     let idle = |probe: usize| !seen[probe] && placement.sampled[probe];
     let needs_of_cell = |cell: usize| -> Vec<Need> {
         if !(0..8).any(|i| idle(grid.corner(grid.cell_base(cell), i).0 as usize)) {

@@ -199,8 +199,9 @@ impl Settler<'_, '_> {
             let (mut position, mut around) = best;
             for _ in 0..MAX_MOVES {
                 let Some(moved) = self.better(position, &around) else { break };
-                let is_near = moved.distance(grid_point) <= MAX_MOVE * self.spacing_m;
-                if !is_near {
+                // Of the nearest of nothing there is no distance, nor of what is infinitely far.
+                let near = moved.is_finite() && moved.distance(grid_point) <= MAX_MOVE * self.spacing_m;
+                if !near {
                     break;
                 }
                 (position, around) = (moved, self.look(moved));

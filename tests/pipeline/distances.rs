@@ -4,6 +4,7 @@ use glam::{DVec3, UVec3, Vec2, Vec3};
 use lightprobe::probe::map::OctahedralMaps;
 use lightprobe::probe::placement::ProbeState;
 use lightprobe::probe::query::{Query, QueryPoint, QuerySettings, Visibility, VisibilitySettings};
+use lightprobe::probe::surface_visibility::Facing;
 use lightprobe::probe::volume::IrradianceCurve;
 use lightprobe::probe::{Grid, Volume};
 
@@ -125,7 +126,7 @@ fn pair(above: Vec2, below: Vec2) -> Volume {
         },
         states: vec![ProbeState::Active; 2],
         positions: vec![Vec3::ZERO, Vec3::X],
-        irradiance: OctahedralMaps::new(2, 1, 0, Vec3::ONE),
+        irradiance: OctahedralMaps::new(2, 1, 0, glam::Vec3A::ONE),
         curve: IrradianceCurve::Linear,
         distance: Some(distance),
         surface_visibility: None,
@@ -141,7 +142,7 @@ fn weight(volume: &Volume, distance: f32) -> f32 {
     let point = QueryPoint {
         position: Vec3::Z * distance,
         normal: Vec3::NEG_Z,
-        geometric_normal: Vec3::NEG_Z,
+        facing: Facing::of(Vec3::NEG_Z),
         view: Vec3::NEG_Z,
     };
     Query { volume, settings: &settings }.weights(&point, Visibility::Stored).weights[0]

@@ -34,9 +34,9 @@ fn check_means(files: &[ProbeFile], probes: &[usize], expected: [f64; 3], what: 
     assert!(!probes.is_empty(), "{what}: no probe");
     for &probe in probes {
         let means: Vec<_> = files.iter().map(|f| f.mean_irradiance(probe)).collect();
-        for c in 0..3 {
+        for (c, expected) in expected.into_iter().enumerate() {
             let mean = means.iter().map(|m| m[c]).sum::<f64>() / files.len() as f64;
-            let off = mean / expected[c] - 1.0;
+            let off = mean / expected - 1.0;
             assert!(off.abs() < 0.005, "{what}, probe {probe}, channel {c}: off by {off}");
         }
     }
@@ -45,9 +45,9 @@ fn check_means(files: &[ProbeFile], probes: &[usize], expected: [f64; 3], what: 
 /// Texels' means over the files within five standard errors and the solver's tolerance.
 fn check_texels(files: &[ProbeFile], probes: &[usize], expected: [f64; 3], what: &str) {
     let largest = expected.iter().copied().fold(0.0, f64::max);
-    for c in 0..3 {
+    for (c, expected) in expected.into_iter().enumerate() {
         let samples = Samples::of(files, probes, c);
-        let exact = vec![expected[c]; samples.values[0].len()];
+        let exact = vec![expected; samples.values[0].len()];
         samples.check(&exact, SOLVER_FLOOR * largest, what);
     }
 }
@@ -62,7 +62,8 @@ fn the_scene_of_the_repository() {
     let words = "--set encoding.irradiance=f32 --set grid.divisions=(4,4,4) \
                  --set grid.bounds={\"min\":[-0.9,0.1,-0.9],\"max\":[0.9,1.9,0.9]}";
     let files = seeds(&folder, &scene("furnace"), words, 4);
-    assert_eq!(files[0].active().len(), 64, "every probe is in the air");
+    // The walls use the outer probes only; the 2³ inner ones are not asked by any surface.
+    assert_eq!(files[0].active().len(), 64 - 8, "every probe that a wall asks is active");
     check(&files, &files[0].active(), expected([1.0; 3], [0.5; 3]), "furnace.glb");
 }
 

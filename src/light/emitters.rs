@@ -141,7 +141,9 @@ impl Emitters {
     pub fn all_behind(&self, point: Vec3, normal: Vec3) -> bool {
         let (low, high) = self.bounds;
         let foremost = Vec3::select(normal.cmpge(Vec3::ZERO), high, low);
-        self.sky.is_none() && (foremost - point).dot(normal) <= 0.0
+        // Not a number where there are no triangles: nothing is in front then.
+        let any_in_front = (foremost - point).dot(normal) > 0.0;
+        self.sky.is_none() && !any_in_front
     }
 
     fn sky_share(&self) -> f32 {

@@ -10,8 +10,10 @@ use glam::{Vec2, Vec3};
 
 use crate::math::alias::AliasTable;
 use crate::math::color::luminance;
-use crate::math::random::Random;
-use crate::math::sampling::{UNIFORM_SPHERE_DENSITY, triangle_barycentric, uniform_sphere};
+use crate::math::random::unit_from_bits;
+use crate::math::sampling::{
+    UNIFORM_SPHERE_DENSITY, cosine_hemisphere_density, triangle_barycentric, uniform_sphere,
+};
 use crate::scene::environment::EnvironmentMap;
 use crate::scene::{Environment, Scene, TriangleIndex};
 use crate::trace::Hit;
@@ -24,7 +26,7 @@ const POWER_GRID: usize = 4;
 /// texture which the grid missed is still sampled now and then (the estimate steers noise, never the mean).
 const POWER_FLOOR: f32 = 0.01;
 
-/// Share of light samples that go to the sky when there are emissive triangles too.
+/// Share of light samples that go to the sky when there are emissive triangles too ([`Emitters::draw`] spends a bit).
 const SKY_SHARE: f32 = 0.5;
 
 /// A direction from which light may arrive.
@@ -61,7 +63,7 @@ struct EmissiveTriangle {
     density_per_area: f32,
     double_sided: bool,
     /// Emitted radiance times opacity where no texture changes it, W·m⁻²·sr⁻¹.
-    radiance: Option<Vec3>,
+    constant_radiance: Option<Vec3>,
     index: TriangleIndex,
 }
 
@@ -72,7 +74,7 @@ impl EmissiveTriangle {
         let textured = material.emission_texture.is_some()
             || material.base_color_texture.is_some()
             || !scene.mesh.colors.is_empty();
-        let radiance = (!textured).then(|| scene.emission(index, Vec2::ZERO) * scene.opacity(index, Vec2::ZERO));
+        let constant_radiance = (!textured).then(|| scene.emission(index, Vec2::ZERO) * scene.opacity(index, Vec2::ZERO));
         EmissiveTriangle {
             corner: corners[0],
             edges: [corners[1] - corners[0], corners[2] - corners[0]],
@@ -80,7 +82,7 @@ impl EmissiveTriangle {
             ray_offset: ray_offset(&corners),
             density_per_area: (probability / f64::from(scene.mesh.area(index))) as f32,
             double_sided: material.double_sided,
-            radiance,
+            constant_radiance,
             index,
         }
     }
@@ -88,6 +90,45 @@ impl EmissiveTriangle {
     fn point(&self, barycentric: Vec2) -> Vec3 {
         self.corner + self.edges[0] * barycentric.x + self.edges[1] * barycentric.y
     }
+
+    /// Emitted radiance times opacity.
+    #[inline]
+    fn radiance(&self, scene: &Scene, barycentric: Vec2) -> Vec3 {
+        self.constant_radiance
+            .unwrap_or_else(|| scene.emission(self.index, barycentric) * scene.opacity(self.index, barycentric))
+    }
+
+    /// Where a shadow segment to a point of the triangle ends: short of it, on the side that faces the receiver, which
+    /// the sign of `cosine` names.
+    #[inline]
+    fn shadow_target(&self, point: Vec3, cosine: f32) -> Vec3 {
+        point + self.normal * self.ray_offset.copysign(cosine)
+    }
+}
+
+/// An emitter chosen and a place on it.
+enum Drawn<'e> {
+    Sky { direction: Vec3, density: f32 },
+    Triangle { triangle: &'e EmissiveTriangle, barycentric: Vec2 },
+}
+
+/// Where irradiance is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Receiver {
+    pub position: Vec3,
+    /// Unit; that of shading.
+    pub normal: Vec3,
+    /// Unit; nothing arrives from below.
+    pub geometric_normal: Vec3,
+}
+
+/// Irradiance that arrives unless something is in between.
+#[derive(Debug, Clone, Copy)]
+pub struct IrradianceSample {
+    /// End of the shadow segment, or unit direction of the sky.
+    pub target: Result<Vec3, Vec3>,
+    /// W·m⁻².
+    pub irradiance: Vec3,
 }
 
 enum Sky {
@@ -146,6 +187,11 @@ impl Emitters {
         self.sky.is_none() && !any_in_front
     }
 
+    /// Whether the only emitter is a sky of one radiance: then cosine-distributed rays are the best samples there are.
+    pub fn is_uniform_sky(&self) -> bool {
+        self.alias.is_none() && matches!(self.sky, Some(Sky::Uniform))
+    }
+
     fn sky_share(&self) -> f32 {
         match (&self.alias, &self.sky) {
             (_, None) => 0.0,
@@ -154,20 +200,40 @@ impl Emitters {
         }
     }
 
-    /// A direction from `point` towards an emitter; `None` where the chosen one cannot light it.
+    /// The emitter that uniform random bits choose, and a place on it.
     #[inline]
-    pub fn sample(&self, scene: &Scene, point: Vec3, random: &mut Random) -> Option<LightSample> {
-        let sky_share = self.sky_share();
-        // No number is drawn where there is no choice.
-        if sky_share == 1.0 || (sky_share > 0.0 && random.uniform() < sky_share) {
-            let (direction, density) = self.sky.as_ref()?.sample(&scene.environment, random);
-            let radiance = scene.environment.radiance(direction);
-            return Some(LightSample { direction, target: None, radiance, density: density * sky_share });
+    fn draw(&self, scene: &Scene, bits: [u32; 4]) -> Option<Drawn<'_>> {
+        let [mut choice, word, u, v] = bits;
+        let place = Vec2::new(unit_from_bits(u), unit_from_bits(v));
+        match (&self.alias, &self.sky) {
+            (None, None) => return None,
+            (Some(_), None) => {}
+            (alias, Some(sky)) => {
+                // With triangles beside it the top bit decides, and the other bits serve on.
+                if alias.is_none() || choice >> 31 == 0 {
+                    choice <<= u32::from(alias.is_some());
+                    let (direction, density) = sky.sample(&scene.environment, [choice, word], place);
+                    return Some(Drawn::Sky { direction, density: density * self.sky_share() });
+                }
+                choice <<= 1;
+            }
         }
-        let triangle = &self.triangles[self.alias.as_ref()?.draw(random)];
-        let barycentric = triangle_barycentric(Vec2::new(random.uniform(), random.uniform()));
-        let target = triangle.point(barycentric);
-        let to_target = target - point;
+        let triangle = &self.triangles[self.alias.as_ref()?.draw([choice, word])];
+        Some(Drawn::Triangle { triangle, barycentric: triangle_barycentric(place) })
+    }
+
+    /// A direction from `point` towards an emitter, drawn by uniform random bits; `None` where the emitter cannot light
+    /// the point.
+    pub fn sample(&self, scene: &Scene, point: Vec3, bits: [u32; 4]) -> Option<LightSample> {
+        let (triangle, barycentric) = match self.draw(scene, bits)? {
+            Drawn::Sky { direction, density } => {
+                let radiance = scene.environment.radiance(direction);
+                return Some(LightSample { direction, target: None, radiance, density });
+            }
+            Drawn::Triangle { triangle, barycentric } => (triangle, barycentric),
+        };
+        let on_triangle = triangle.point(barycentric);
+        let to_target = on_triangle - point;
         let distance_squared = to_target.length_squared();
         let direction = to_target * distance_squared.sqrt().recip();
         let cosine = -triangle.normal.dot(direction);
@@ -175,16 +241,63 @@ impl Emitters {
             return None;
         }
         // Not finite where the point lies on the emitter or in its plane.
-        let density = triangle.density_per_area * (1.0 - sky_share) * distance_squared / cosine.abs();
+        let density = triangle.density_per_area * (1.0 - self.sky_share()) * distance_squared / cosine.abs();
         if !density.is_finite() {
             return None;
         }
-        let radiance = triangle.radiance.unwrap_or_else(|| {
-            scene.emission(triangle.index, barycentric) * scene.opacity(triangle.index, barycentric)
-        });
-        // Stop short of the emitter itself, on the side that faces the point.
-        let target = target + triangle.normal * (triangle.ray_offset * cosine.signum());
-        Some(LightSample { direction, target: Some(target), radiance, density })
+        let target = triangle.shadow_target(on_triangle, cosine);
+        Some(LightSample { direction, target: Some(target), radiance: triangle.radiance(scene, barycentric), density })
+    }
+
+    /// As [`Self::sample`], for a Lambertian receiver of irradiance and the balance heuristic against
+    /// `n_cosine` cosine-distributed rays beside `n_light` light samples: what this sample adds to the irradiance if it
+    /// is not shadowed, W·m⁻².
+    ///
+    /// With c = n·(y − x) and c' = n_y·(x − y), d the distance: the cosines are c/d and c'/d, the densities of the two
+    /// techniques c/(πd) and p_A·d³/c', so that L·(c/d) ÷ (n_c·c/(πd) + n_l·p_A·d³/c') = L·c·c' ÷ (n_c·c·c'/π +
+    /// n_l·p_A·d⁴): one division and no root.
+    #[inline]
+    pub fn irradiance_sample(
+        &self,
+        scene: &Scene,
+        receiver: &Receiver,
+        [n_cosine, n_light]: [f32; 2],
+        bits: [u32; 4],
+    ) -> Option<IrradianceSample> {
+        match self.draw(scene, bits)? {
+            Drawn::Sky { direction, density } => {
+                let cosine = receiver.normal.dot(direction);
+                if cosine <= 0.0 || receiver.geometric_normal.dot(direction) <= 0.0 {
+                    return None;
+                }
+                let radiance = scene.environment.radiance(direction);
+                let density = n_cosine * cosine_hemisphere_density(cosine) + n_light * density;
+                (radiance != Vec3::ZERO)
+                    .then(|| IrradianceSample { target: Err(direction), irradiance: radiance * (cosine / density) })
+            }
+            Drawn::Triangle { triangle, barycentric } => {
+                let on_triangle = triangle.point(barycentric);
+                let to_target = on_triangle - receiver.position;
+                let c = receiver.normal.dot(to_target);
+                let c_geometric = receiver.geometric_normal.dot(to_target);
+                let towards = -triangle.normal.dot(to_target);
+                let c_emitter = if triangle.double_sided { towards.abs() } else { towards };
+                // All three at once: which of them fails cannot be predicted.
+                if c.min(c_geometric).min(c_emitter) <= 0.0 {
+                    return None;
+                }
+                let d2 = to_target.length_squared();
+                let per_area = triangle.density_per_area * (1.0 - self.sky_share());
+                let product = c * c_emitter;
+                let share = product / (n_cosine * (1.0 / PI) * product + n_light * (per_area * d2) * d2);
+                let radiance = triangle.radiance(scene, barycentric);
+                // Not finite where the receiver lies on the emitter.
+                (share.is_finite() && radiance != Vec3::ZERO).then(|| IrradianceSample {
+                    target: Ok(triangle.shadow_target(on_triangle, towards)),
+                    irradiance: radiance * share,
+                })
+            }
+        }
     }
 
     /// Density with which [`Self::sample`] would have drawn this hit along unit `direction` from `point`, sr⁻¹.
@@ -221,18 +334,19 @@ impl Sky {
         }
     }
 
-    fn sample(&self, environment: &Environment, random: &mut Random) -> (Vec3, f32) {
+    /// Direction and density by uniform random bits and a uniform place in the unit square.
+    fn sample(&self, environment: &Environment, bits: [u32; 2], place: Vec2) -> (Vec3, f32) {
         match (self, environment) {
             (Sky::Map { alias, density }, Environment::Map(map)) => {
-                let texel = alias.draw(random);
+                let texel = alias.draw(bits);
                 let (x, y) = ((texel % map.width) as f32, (texel / map.width) as f32);
                 // Uniform in solid angle within the texel: uniform in the cosine of the polar angle.
                 let cos_of = |row: f32| (row / map.height as f32 * PI).cos();
-                let cosine = cos_of(y) + (cos_of(y + 1.0) - cos_of(y)) * random.uniform();
-                let u = (x + random.uniform()) / map.width as f32;
+                let cosine = cos_of(y) + (cos_of(y + 1.0) - cos_of(y)) * place.y;
+                let u = (x + place.x) / map.width as f32;
                 (EnvironmentMap::direction(Vec2::new(u, cosine.clamp(-1.0, 1.0).acos() / PI)), density[texel])
             }
-            _ => (uniform_sphere(Vec2::new(random.uniform(), random.uniform())), UNIFORM_SPHERE_DENSITY),
+            _ => (uniform_sphere(place), UNIFORM_SPHERE_DENSITY),
         }
     }
 

@@ -7,9 +7,9 @@
 use glam::{Vec2, Vec3};
 
 use super::World;
-use super::emitters::LightSample;
+use super::emitters::{LightSample, Receiver};
 use super::surface::SurfacePoint;
-use crate::math::random::Random;
+use crate::math::random::{Random, Spread};
 use crate::math::sampling::{cosine_hemisphere, cosine_hemisphere_density};
 use crate::trace::Ray;
 
@@ -55,38 +55,37 @@ impl World<'_> {
         random: &mut Random,
         rays: &mut RayCount,
     ) -> Vec3 {
-        let origin = point.ray_origin();
-        if self.emitters.all_behind(origin, point.geometric_normal) {
+        let receiver = Receiver { position: point.ray_origin(), normal, geometric_normal: point.geometric_normal };
+        if self.emitters.all_behind(receiver.position, receiver.geometric_normal) {
             return Vec3::ZERO;
         }
-        let (n_cosine, n_light) = (allocation.cosine as f32, allocation.light as f32);
+        let counts = [allocation.cosine as f32, allocation.light as f32];
         let mut sum = Vec3::ZERO;
         for i in 0..allocation.cosine {
             // Stratified along one axis; the other is free.
-            let u = Vec2::new((i as f32 + random.uniform()) / n_cosine, random.uniform());
+            let u = Vec2::new((i as f32 + random.uniform()) / counts[0], random.uniform());
             let direction = cosine_hemisphere(normal, u);
             let cosine = normal.dot(direction);
-            if point.geometric_normal.dot(direction) <= 0.0 || cosine <= 0.0 {
+            if receiver.geometric_normal.dot(direction).min(cosine) <= 0.0 {
                 continue;
             }
             rays.shadow += 1;
-            let ray = Ray::new(origin, direction, random.bits());
-            let (radiance, light_density) = self.emitted_along(ray);
+            let (radiance, light_density) = self.emitted_along(Ray::new(receiver.position, direction, random.bits()));
             if radiance != Vec3::ZERO {
-                let density = n_cosine * cosine_hemisphere_density(cosine) + n_light * light_density;
+                let density = counts[0] * cosine_hemisphere_density(cosine) + counts[1] * light_density;
                 sum += radiance * (cosine / density);
             }
         }
-        for _ in 0..allocation.light {
-            let Some(sample) = self.emitters.sample(self.scene, origin, random) else { continue };
-            let cosine = normal.dot(sample.direction);
-            if cosine <= 0.0 || point.geometric_normal.dot(sample.direction) <= 0.0 || sample.radiance == Vec3::ZERO {
-                continue;
-            }
-            rays.shadow += 1;
-            if self.reaches(origin, &sample, random.bits()) {
-                let density = n_cosine * cosine_hemisphere_density(cosine) + n_light * sample.density;
-                sum += sample.radiance * (cosine / density);
+        for bits in Spread::new(random).take(allocation.light as usize) {
+            if let Some(sample) = self.emitters.irradiance_sample(self.scene, &receiver, counts, bits) {
+                rays.shadow += 1;
+                let ray = match sample.target {
+                    Ok(target) => Ray::segment(receiver.position, target, bits[0]),
+                    Err(direction) => Ray::new(receiver.position, direction, bits[0]),
+                };
+                if !self.tracer.occluded(ray) {
+                    sum += sample.irradiance;
+                }
             }
         }
         sum
@@ -95,10 +94,15 @@ impl World<'_> {
     /// Radiance emitted towards the ray's origin by what the ray meets first, and the density of finding it by light
     /// sampling. The ray's direction has unit length.
     fn emitted_along(&self, ray: Ray) -> (Vec3, f32) {
-        let Some(hit) = self.tracer.closest(ray) else {
+        let sky = || {
             let radiance = self.scene.environment.radiance(ray.direction);
-            return (radiance, self.emitters.density_of_sky(self.scene, ray.direction));
+            (radiance, self.emitters.density_of_sky(self.scene, ray.direction))
         };
+        if self.emitters.triangle_count() == 0 {
+            // Whatever stops the ray is dark: any hit will do.
+            return if self.tracer.occluded(ray) { (Vec3::ZERO, 0.0) } else { sky() };
+        }
+        let Some(hit) = self.tracer.closest(ray) else { return sky() };
         let radiance = self.emission_towards(&hit, ray.direction);
         if radiance == Vec3::ZERO {
             return (radiance, 0.0);

@@ -3,8 +3,6 @@
 //! Source: Vose, *A Linear Algorithm for Generating Random Numbers with a Given Distribution*, 1991. The capture draws
 //! one emitter per shadow ray, so a draw must cost little against a ray: one 64-bit word and one entry of 8 bytes.
 
-use super::random::Random;
-
 /// A discrete distribution.
 #[derive(Debug, Clone)]
 pub struct AliasTable {
@@ -49,23 +47,20 @@ impl AliasTable {
         Some(AliasTable { entries })
     }
 
-    /// An index with the probability of its weight. A table of one takes no random number.
+    /// An index with the probability of its weight, by uniform random bits.
     #[inline]
-    pub fn draw(&self, random: &mut Random) -> usize {
-        if self.entries.len() == 1 {
-            return 0;
-        }
+    pub fn draw(&self, bits: [u32; 2]) -> usize {
         // The high word of bits × n is the column, uniform to n/2³²; the second word chooses within it.
-        let column = ((u64::from(random.bits()) * self.entries.len() as u64) >> 32) as usize;
+        let column = ((u64::from(bits[0]) * self.entries.len() as u64) >> 32) as usize;
         let entry = self.entries[column];
-        if random.bits() < entry.own { column } else { entry.alias as usize }
+        if bits[1] < entry.own { column } else { entry.alias as usize }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::random::Purpose;
+    use crate::math::random::{Purpose, Random};
 
     #[test]
     fn indices_come_as_often_as_their_weights_say() {
@@ -74,7 +69,7 @@ mod tests {
         let n = 200_000;
         let mut random = Random::new(5, Purpose::Capture, 0, 0);
         let mut count = [0u32; 6];
-        (0..n).for_each(|_| count[table.draw(&mut random)] += 1);
+        (0..n).for_each(|_| count[table.draw([random.bits(), random.bits()])] += 1);
         let total: f64 = weights.iter().sum();
         for (count, weight) in count.into_iter().zip(weights) {
             let p = weight / total;
@@ -89,6 +84,6 @@ mod tests {
         for weights in [&[] as &[f64], &[0.0], &[-1.0, 2.0], &[f64::NAN], &[f64::INFINITY, 1.0]] {
             assert!(AliasTable::new(weights).is_none(), "{weights:?}");
         }
-        assert_eq!(AliasTable::new(&[3.0]).unwrap().draw(&mut Random::new(1, Purpose::Capture, 0, 0)), 0);
+        assert_eq!(AliasTable::new(&[3.0]).unwrap().draw([u32::MAX, u32::MAX]), 0);
     }
 }

@@ -30,12 +30,45 @@ impl Random {
     /// Uniform in [0,1), a multiple of 2⁻²⁴.
     #[inline]
     pub fn uniform(&mut self) -> f32 {
-        (self.0.next_u32() >> 8) as f32 * (1.0 / (1u32 << 24) as f32)
+        unit_from_bits(self.0.next_u32())
     }
 
     #[inline]
     pub fn bits(&mut self) -> u32 {
         self.0.next_u32()
+    }
+}
+
+/// Uniform in [0,1), a multiple of 2⁻²⁴, from uniform bits.
+#[inline]
+pub fn unit_from_bits(bits: u32) -> f32 {
+    (bits >> 8) as f32 * (1.0 / (1u32 << 24) as f32)
+}
+
+/// Points in four dimensions that fill the unit cube evenly from a random start: a Kronecker sequence with the powers of
+/// 1/φ₄, φ₄ the positive root of x⁵ = x + 1 (Roberts, *The Unreasonable Effectiveness of Quasirandom Sequences*, 2018),
+/// in units of 2⁻³², where wrapping around is free. Each point for itself is uniform.
+#[derive(Debug, Clone)]
+pub struct Spread([u32; 4]);
+
+impl Spread {
+    /// 2³²·φ₄⁻¹ … 2³²·φ₄⁻⁴.
+    const STEP: [u32; 4] = [3_679_390_609, 3_152_041_523, 2_700_274_806, 2_313_257_605];
+
+    pub fn new(random: &mut Random) -> Spread {
+        Spread(std::array::from_fn(|_| random.bits()))
+    }
+}
+
+impl Iterator for Spread {
+    type Item = [u32; 4];
+
+    /// Endless.
+    #[inline]
+    fn next(&mut self) -> Option<[u32; 4]> {
+        let point = self.0;
+        self.0 = std::array::from_fn(|i| point[i].wrapping_add(Spread::STEP[i]));
+        Some(point)
     }
 }
 

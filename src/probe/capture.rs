@@ -13,7 +13,7 @@ use crate::light::lambert::reflected_radiance;
 use crate::light::sampled::{Allocation, RayCount};
 use crate::light::surface::SurfacePoint;
 use crate::math::octahedral::{direction_and_density, oct_from_direction, solid_angle_density};
-use crate::math::random::{Purpose, Random};
+use crate::math::random::{Purpose, Random, Spread};
 use crate::math::statistics::Moments;
 use crate::trace::Ray;
 
@@ -152,12 +152,15 @@ impl Capture<'_, '_> {
 
     /// Emitter samples at every hit.
     fn surface_allocation(&self) -> Option<Allocation> {
-        self.samples_emitters().then(|| Allocation::by_coverage(self.settings.emitter_samples, self.emitter_coverage))
+        // A sky of one radiance is sampled best by the cosine alone.
+        let coverage = if self.world.emitters.is_uniform_sky() { 1.0 } else { self.emitter_coverage };
+        self.samples_emitters().then(|| Allocation::by_coverage(self.settings.emitter_samples, coverage))
     }
 
     /// Emitter samples at a probe centre: fewer, the more of the sphere emits, for the capture's own rays find it then.
     fn probe_samples(&self) -> u32 {
-        if !self.samples_emitters() {
+        // The capture's own rays are even denser samples of a sky of one radiance.
+        if !self.samples_emitters() || self.world.emitters.is_uniform_sky() {
             return 0;
         }
         Allocation::by_coverage(self.settings.probe_emitter_samples, self.emitter_coverage).light
@@ -166,87 +169,108 @@ impl Capture<'_, '_> {
     /// Captures the probe at `position`. Depends on nothing but the arguments and `self`.
     pub fn probe(&self, index: usize, position: Vec3, contains: impl Fn(Vec3) -> bool) -> ProbeCapture {
         let samples = self.settings.samples_per_texel.max(1);
-        let emitter_samples = EmitterSamples { surface: self.surface_allocation(), probe: self.probe_samples() };
+        let (allocation, light_samples) = (self.surface_allocation(), self.probe_samples());
+        let world = self.world;
         let mut out = ProbeCapture {
             texels: self.texels(),
             distances: vec![Moments::default(); if self.distance_clamp_m.is_some() { self.texels() } else { 0 }],
             surfels: Vec::with_capacity(self.texels() * samples),
             ..Default::default()
         };
-        let resolution = self.settings.resolution as u32;
-        let strata = Strata::new(samples, resolution);
-        let texel_size = 2.0 / resolution as f32;
-        let corner_of_texel =
-            |texel: u32| UVec2::new(texel % resolution, texel / resolution).as_vec2() * texel_size - 1.0;
+        let strata = Strata::new(samples, self.settings.resolution as u32);
         let mut random = Random::new(self.seed, Purpose::Capture, index as u64, 0);
-        let mut rays = Vec::with_capacity(samples);
-        for texel in 0..self.texels() as u32 {
+        // A row of texels at a time, in short loops whose turns do not wait for one another: hits are scattered over
+        // memory, and one long loop would wait for each in its turn.
+        let (mut rays, mut hits, mut lit) = (Vec::new(), Vec::new(), Vec::new());
+        for row in 0..self.settings.resolution as u32 {
             rays.clear();
-            let corner = corner_of_texel(texel);
-            rays.extend(strata.corners.iter().map(|stratum| {
-                let jitter = Vec2::new(random.uniform(), random.uniform());
-                direction_and_density(corner + stratum + jitter * strata.size)
-            }));
-            let sum: f32 = rays.iter().map(|(_, solid_angle)| solid_angle).sum();
-            for &(direction, solid_angle) in &rays {
-                let ray = TexelRay { texel, direction, solid_angle, share: solid_angle / sum };
-                self.ray(position, &ray, &emitter_samples, &mut random, &contains, &mut out);
+            strata.rays(row, &mut random, &mut rays);
+            hits.clear();
+            hits.extend(rays.iter().map(|r| world.tracer.closest(Ray::new(position, r.direction, random.bits()))));
+            lit.clear();
+            for (ray, hit) in rays.iter().zip(&hits) {
+                match hit {
+                    None => self.meet_sky(ray, light_samples, &mut out),
+                    Some(hit) => {
+                        let surface = world.surface_at(*hit, ray.direction);
+                        self.meet_surface(position, ray, &surface, light_samples, &mut out);
+                        out.hits_outside_volume += u64::from(!contains(surface.position));
+                        // What reflects nothing no bounce will ever ask for.
+                        if surface.albedo != Vec3::ZERO {
+                            lit.push((*ray, surface));
+                        }
+                    }
+                }
+            }
+            for (ray, surface) in &lit {
+                self.light(ray, surface, allocation, &mut random, &mut out);
             }
         }
         out.rays.primary += (self.texels() * samples) as u64;
-        self.sample_emitters(index, position, emitter_samples.probe, samples, &mut out);
+        self.sample_emitters(index, position, light_samples, samples, &mut out);
         out.surfels.shrink_to_fit();
         out
     }
 
-    /// One capture ray.
+    /// Share of the radiance along a capture ray that counts, beside `light_samples` emitter samples drawn from the
+    /// probe's centre with `light_density` (balance heuristic).
+    fn gathered_share(&self, ray: &TexelRay, light_samples: u32, light_density: f32) -> f32 {
+        // Density of capture rays in this direction, sr⁻¹: their number per area of the square ÷ dω/dA.
+        let per_area = (self.settings.samples_per_texel.max(1) * self.texels()) as f32 / 4.0;
+        let density = per_area / ray.solid_angle;
+        density / (density + light_samples as f32 * light_density)
+    }
+
+    /// A capture ray that leaves the scene.
+    fn meet_sky(&self, ray: &TexelRay, light_samples: u32, out: &mut ProbeCapture) {
+        let (scene, emitters) = (self.world.scene, &self.world.emitters);
+        let radiance = scene.environment.radiance(ray.direction);
+        if radiance != Vec3::ZERO {
+            let gathered =
+                self.gathered_share(ray, light_samples, emitters.density_of_sky(scene, ray.direction)) * ray.share;
+            out.emitted.push((ray.texel, radiance * gathered));
+        }
+        if let Some(clamp) = self.distance_clamp_m {
+            out.distances[ray.texel as usize].add(f64::from(clamp), f64::from(ray.share));
+        }
+    }
+
+    /// Distance and emission of what a capture ray hits.
     #[inline]
-    fn ray(
+    fn meet_surface(
         &self,
         position: Vec3,
         ray: &TexelRay,
-        emitter_samples: &EmitterSamples,
+        surface: &SurfacePoint,
+        light_samples: u32,
+        out: &mut ProbeCapture,
+    ) {
+        if let Some(clamp) = self.distance_clamp_m {
+            out.distances[ray.texel as usize].add(f64::from(surface.hit.t.min(clamp)), f64::from(ray.share));
+        }
+        if surface.emission != Vec3::ZERO {
+            let light_density = self.world.emitters.density_of_hit(position, ray.direction, &surface.hit);
+            let gathered = self.gathered_share(ray, light_samples, light_density) * ray.share;
+            out.emitted.push((ray.texel, surface.emission * gathered));
+        }
+    }
+
+    /// Lights a hit and keeps it.
+    #[inline]
+    fn light(
+        &self,
+        ray: &TexelRay,
+        surface: &SurfacePoint,
+        allocation: Option<Allocation>,
         random: &mut Random,
-        contains: impl Fn(Vec3) -> bool,
         out: &mut ProbeCapture,
     ) {
         let world = self.world;
-        let TexelRay { texel, direction, share, .. } = *ray;
-        // Balance heuristic between this ray and the emitter samples drawn from the probe's centre.
-        let gathered_share = |light_density: f32| {
-            // Density of capture rays in this direction, sr⁻¹: their number per area of the square ÷ dω/dA.
-            let per_area = (self.settings.samples_per_texel.max(1) * self.texels()) as f32 / 4.0;
-            let density = per_area / ray.solid_angle;
-            density / (density + emitter_samples.probe as f32 * light_density)
-        };
-        let Some(surface) = world.surface(Ray::new(position, direction, random.bits())) else {
-            let radiance = world.scene.environment.radiance(direction);
-            if radiance != Vec3::ZERO {
-                let gathered = gathered_share(world.emitters.density_of_sky(world.scene, direction));
-                out.emitted.push((texel, radiance * (gathered * share)));
-            }
-            if let Some(clamp) = self.distance_clamp_m {
-                out.distances[texel as usize].add(f64::from(clamp), f64::from(share));
-            }
-            return;
-        };
-        if let Some(clamp) = self.distance_clamp_m {
-            out.distances[texel as usize].add(f64::from(surface.hit.t.min(clamp)), f64::from(share));
-        }
-        if surface.emission != Vec3::ZERO {
-            let gathered = gathered_share(world.emitters.density_of_hit(position, direction, &surface.hit));
-            out.emitted.push((texel, surface.emission * (gathered * share)));
-        }
-        out.hits_outside_volume += u64::from(!contains(surface.position));
-        if surface.albedo == Vec3::ZERO {
-            // Reflects nothing: no bounce will ever ask for it.
-            return;
-        }
         let normal = surface.shading_normal;
-        let (punctual, shadow_rays) = world.punctual_irradiance(&surface, normal, random.bits());
+        let (punctual, shadow_rays) = world.punctual_irradiance(surface, normal, random.bits());
         out.rays.shadow += u64::from(shadow_rays);
-        let sampled = match emitter_samples.surface {
-            Some(allocation) => world.emitter_irradiance(&surface, normal, allocation, random, &mut out.rays),
+        let sampled = match allocation {
+            Some(allocation) => world.emitter_irradiance(surface, normal, allocation, random, &mut out.rays),
             None => Vec3::ZERO,
         };
         let mut direct = reflected_radiance(surface.albedo, punctual + sampled);
@@ -254,20 +278,20 @@ impl Capture<'_, '_> {
             out.non_finite += 1;
             direct = Vec3::ZERO;
         }
-        out.surfels.push(Surfel::new(&surface, direct, texel, share));
+        out.surfels.push(Surfel::new(surface, direct, ray.texel, ray.share));
     }
 
     /// Draws emitters from the probe's centre.
     fn sample_emitters(&self, index: usize, position: Vec3, count: u32, per_texel: usize, out: &mut ProbeCapture) {
         let world = self.world;
         let mut random = Random::new(self.seed, Purpose::ProbeEmission, index as u64, 0);
-        for _ in 0..count {
-            let Some(sample) = world.emitters.sample(world.scene, position, &mut random) else { continue };
+        for bits in Spread::new(&mut random).take(count as usize) {
+            let Some(sample) = world.emitters.sample(world.scene, position, bits) else { continue };
             if sample.radiance == Vec3::ZERO {
                 continue;
             }
             out.rays.shadow += 1;
-            if world.reaches(position, &sample, random.bits()) {
+            if world.reaches(position, &sample, bits[0]) {
                 let oct = oct_from_direction(sample.direction);
                 let capture_density = per_texel as f32 * self.texels() as f32 / (4.0 * solid_angle_density(oct));
                 let density = capture_density + count as f32 * sample.density;
@@ -300,15 +324,8 @@ impl ProbeCapture {
     }
 }
 
-/// How often emitters are sampled, the same for all rays of a probe.
-struct EmitterSamples {
-    /// At every hit.
-    surface: Option<Allocation>,
-    /// From the probe's centre.
-    probe: u32,
-}
-
 /// One of the rays through a texel.
+#[derive(Clone, Copy)]
 struct TexelRay {
     texel: u32,
     /// Unit.
@@ -319,9 +336,10 @@ struct TexelRay {
     share: f32,
 }
 
-/// How the samples of a texel are laid out in it.
+/// How rays are laid out in the octahedral square.
 struct Strata {
-    /// Of every stratum, relative to the texel's, in the octahedral square.
+    resolution: u32,
+    /// Of every stratum of a texel, relative to the texel's, in the octahedral square.
     corners: Vec<Vec2>,
     /// Of one stratum in the octahedral square.
     size: Vec2,
@@ -334,6 +352,24 @@ impl Strata {
         let columns = columns.unwrap_or(1);
         let size = 2.0 / (resolution as f32 * Vec2::new(columns as f32, (samples / columns) as f32));
         let corner = |sample: usize| Vec2::new((sample % columns) as f32, (sample / columns) as f32) * size;
-        Strata { corners: (0..samples).map(corner).collect(), size }
+        Strata { resolution, corners: (0..samples).map(corner).collect(), size }
+    }
+
+    /// Rays through a row of texels, one at random in every stratum, appended to `rays`.
+    fn rays(&self, row: u32, random: &mut Random, rays: &mut Vec<TexelRay>) {
+        let texel_size = 2.0 / self.resolution as f32;
+        for column in 0..self.resolution {
+            let corner_of_texel = UVec2::new(column, row).as_vec2() * texel_size - 1.0;
+            let first = rays.len();
+            for stratum in &self.corners {
+                let jitter = Vec2::new(random.uniform(), random.uniform());
+                let (direction, solid_angle) = direction_and_density(corner_of_texel + stratum + jitter * self.size);
+                rays.push(TexelRay { texel: row * self.resolution + column, direction, solid_angle, share: 1.0 });
+            }
+            if let [_, _, ..] = rays[first..] {
+                let inverse_sum = 1.0 / rays[first..].iter().map(|r| r.solid_angle).sum::<f32>();
+                rays[first..].iter_mut().for_each(|r| r.share = r.solid_angle * inverse_sum);
+            }
+        }
     }
 }

@@ -18,6 +18,7 @@ pub mod cli;
 pub mod commands;
 pub mod config;
 pub mod image;
+pub mod input;
 pub mod light;
 pub mod math;
 pub mod output;

@@ -1,11 +1,15 @@
 //! Outputs appear whole or not at all: every writer of the project goes through [`write_atomically`].
 
+mod check;
+
 use std::fs::{self, File, Permissions};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
+
+pub use self::check::{Named, check_apart, check_folder, check_outputs, check_writable};
 
 /// Mode asked for when a file is created; the kernel takes the umask's bits away.
 /// The temporary-file crate would otherwise make it private to its owner (0600).
@@ -28,8 +32,14 @@ pub enum OutputError {
     Full { path: PathBuf },
     #[error("cannot write {path}: it exists and is not a regular file; give the name of a file")]
     NotAFile { path: PathBuf },
-    #[error("cannot create the folder {path}: {blocker} is a file; remove it or choose another path")]
+    #[error("cannot write {path}: {blocker} is not a folder; choose another path")]
+    NoSuchFolder { path: PathBuf, blocker: PathBuf },
+    #[error("cannot create the folder {path}: {blocker} is not a folder; remove it or choose another path")]
     FileInTheWay { path: PathBuf, blocker: PathBuf },
+    #[error("{name}: {path} is {input}, which it would overwrite; choose another path")]
+    IsInput { name: &'static str, path: PathBuf, input: &'static str },
+    #[error("{first} and {second} are the same file, {path}; choose another path for one of them")]
+    Twice { first: &'static str, second: &'static str, path: PathBuf },
     #[error("cannot write {path}: {cause}; choose another path")]
     Other { path: PathBuf, cause: io::Error },
 }
@@ -47,7 +57,7 @@ pub fn write_atomically(
     if fs::metadata(path).is_ok_and(|existing| !existing.is_file()) {
         return Err(OutputError::NotAFile { path: path.to_owned() });
     }
-    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let target = link_target(path);
     let folder = folder_of(&target);
     let written = (|| {
         let mut temporary = tempfile::Builder::new()
@@ -68,30 +78,30 @@ pub fn write_atomically(
     written.map_err(|cause| output_error(path, folder, cause))
 }
 
-/// Refuses paths that [`write_atomically`] will not be able to write: no folder, or something there that is no file.
-///
-/// # Errors
-/// As those of writing.
-pub fn check_writable(path: &Path) -> Result<(), OutputError> {
-    let folder = folder_of(path);
-    if !folder.is_dir() {
-        return Err(OutputError::NoFolder { path: path.to_owned(), folder: folder.to_owned() });
-    }
-    if fs::metadata(path).is_ok_and(|existing| !existing.is_file()) {
-        return Err(OutputError::NotAFile { path: path.to_owned() });
-    }
-    Ok(())
-}
-
 /// Creates `path` and the folders above it where they are missing.
 ///
 /// # Errors
 /// A file in the way, no permission, a full disk.
 pub fn create_folder(path: &Path) -> Result<(), OutputError> {
-    fs::create_dir_all(path).map_err(|cause| match path.ancestors().find(|part| part.is_file()) {
-        Some(blocker) => OutputError::FileInTheWay { path: path.to_owned(), blocker: blocker.to_owned() },
-        None => output_error(path, folder_of(path), cause),
-    })
+    check_folder(path)?;
+    fs::create_dir_all(path).map_err(|cause| output_error(path, folder_of(path), cause))
+}
+
+/// Where a file comes to lie: through symbolic links, at their end, even where there is nothing yet.
+fn link_target(path: &Path) -> PathBuf {
+    /// As Linux has it.
+    const MOST_LINKS: usize = 40;
+    let mut target = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        if let Ok(existing) = fs::canonicalize(&target) {
+            return existing;
+        }
+        match fs::read_link(&target) {
+            Ok(link) => target = folder_of(&target).join(link),
+            Err(_) => break,
+        }
+    }
+    target
 }
 
 /// The folder that `path` lies in; "." for a bare file name.
@@ -106,7 +116,7 @@ fn output_error(path: &Path, folder: &Path, cause: io::Error) -> OutputError {
     let path = path.to_owned();
     let folder = folder.to_owned();
     match cause.kind() {
-        ErrorKind::NotFound | ErrorKind::NotADirectory if !folder.is_dir() => OutputError::NoFolder { path, folder },
+        ErrorKind::NotFound | ErrorKind::NotADirectory if !folder.is_dir() => check::missing_folder(&path, &folder),
         ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => OutputError::Denied { path, folder },
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => OutputError::Full { path },
         ErrorKind::IsADirectory => OutputError::NotAFile { path },
@@ -168,7 +178,7 @@ mod tests {
         let blocked = create_folder(&folder.path().join("file/below/it")).unwrap_err();
         assert!(matches!(blocked, OutputError::FileInTheWay { .. }), "{blocked}");
         let below_a_file = folder.path().join("file/out.bin");
-        assert!(matches!(write_atomically(&below_a_file, |_| Ok(())), Err(OutputError::NoFolder { .. })));
+        assert!(matches!(write_atomically(&below_a_file, |_| Ok(())), Err(OutputError::NoSuchFolder { .. })));
     }
 
     #[test]
@@ -180,6 +190,10 @@ mod tests {
         write_atomically(&link, |file| file.write_all(b"new")).unwrap();
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(fs::read(&target).unwrap(), b"new");
+        fs::remove_file(&target).unwrap();
+        write_atomically(&link, |file| file.write_all(b"again")).unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read(&target).unwrap(), b"again");
     }
 
     #[test]

@@ -5,12 +5,12 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 
-use super::{Console, load_scene, peak_memory_bytes, set_threads, write_json};
+use super::{Console, check_apart_from, inputs, load_scene, peak_memory_bytes, set_threads, write_json};
 use crate::bake::{Baked, Checkpoint, Circumstances, Prepared, prepare};
 use crate::cli::BakeArgs;
 use crate::config::{Config, presets};
 use crate::light::World;
-use crate::output::check_writable;
+use crate::output::{Named, check_outputs};
 use crate::plan::Line;
 use crate::probe::checkpoint;
 use crate::probe::file::SceneRecord;
@@ -29,16 +29,14 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
         return console.print(&config.to_ron());
     }
     let path = args.scene.as_deref().context("no scene: give a .glb or .gltf file")?;
-    if !args.dry_run {
-        let output = args.output.as_ref().context("no output: give -o OUT.probes")?;
-        // Said now rather than after an hour's bake.
-        check_writable(output)?;
-        args.report.as_deref().map_or(Ok(()), check_writable)?;
-    }
+    let outputs = outputs(args)?;
+    let config_file = args.config.as_ref().map(|file| Named::new("the configuration", file));
+    check_outputs(&outputs, &inputs(path, &args.trace, config_file))?;
     let threads = set_threads(args.trace.threads)?;
 
     let started = Instant::now();
     let scene = load_scene(path, &args.trace, &config, console)?;
+    check_apart_from(&scene, &outputs)?;
     let load_s = started.elapsed().as_secs_f64();
     let accel_started = Instant::now();
     let world = World::new(&scene, config.lights.punctual_scale, config.solver.albedo_max)?;
@@ -89,6 +87,17 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
         return console.print(&serde_json::to_string_pretty(&report)?);
     }
     console.print(&summary(&report, output))
+}
+
+/// What will be written; nothing in a dry run.
+fn outputs(args: &BakeArgs) -> Result<Vec<Named>> {
+    if args.dry_run {
+        return Ok(Vec::new());
+    }
+    let output = args.output.as_ref().context("no output: give -o OUT.probes")?;
+    let report = args.report.as_ref().map(|report| Named::new("--report", report));
+    let checkpoint = Named::new("the file that --resume reads", checkpoint::path_for(output));
+    Ok([Named::new("-o", output), checkpoint].into_iter().chain(report).collect())
 }
 
 fn list_presets(console: &Console) -> Result<()> {

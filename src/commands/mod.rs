@@ -11,7 +11,7 @@ use anyhow::{Context, Result};
 
 use crate::cli::{Cli, Command, OutputFlags, TraceArgs};
 use crate::config::Config;
-use crate::output::write_atomically;
+use crate::output::{Named, check_apart, write_atomically};
 use crate::progress::Progress;
 use crate::scene::{self, EnvironmentSource, LoadOptions, Scene};
 
@@ -69,6 +69,22 @@ fn set_threads(threads: usize) -> Result<usize> {
     // Fails only when a pool stands already, as when commands run twice in one process.
     let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     Ok(rayon::current_num_threads())
+}
+
+/// What a command reads, for the checks of its outputs.
+fn inputs(scene: &Path, trace: &TraceArgs, others: impl IntoIterator<Item = Named>) -> Vec<Named> {
+    let mut inputs = vec![Named::new("the scene", scene)];
+    if let Some(EnvironmentSource::File(map)) = &trace.env {
+        inputs.push(Named::new("the environment map", map));
+    }
+    inputs.extend(others);
+    inputs
+}
+
+/// Refuses outputs that are files of a loaded scene: its buffers and images.
+fn check_apart_from(scene: &Scene, outputs: &[Named]) -> Result<()> {
+    let files: Vec<Named> = scene.files.iter().map(|file| Named::new("a file of the scene", file)).collect();
+    Ok(check_apart(outputs, &files)?)
 }
 
 /// Loads a scene with the sky from the command line, else from the configuration, and passes its warnings on.

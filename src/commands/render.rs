@@ -6,13 +6,13 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use glam::{DVec3, Vec3};
 
-use super::{Console, load_scene, peak_memory_bytes, set_threads, write_json};
+use super::{Console, check_apart_from, inputs, load_scene, peak_memory_bytes, set_threads, write_json};
 use crate::cli::{LookAt, RenderArgs};
 use crate::config::Config;
 use crate::image::{LayeredImage, Picture8};
 use crate::light::World;
 use crate::math::color::luminance;
-use crate::output::create_folder;
+use crate::output::{Named, check_folder, check_outputs, create_folder};
 use crate::probe::file::{self, ProbeFile};
 use crate::probe::query::{Query, VisibilitySettings};
 use crate::probe::{Volume, layout};
@@ -53,6 +53,8 @@ struct Shaded {
 
 pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
     let started = Instant::now();
+    let inputs = inputs(&args.scene, &args.trace, [Named::new("the probe file", &args.probes)]);
+    check_pictures(&args.output, &inputs)?;
     let threads = set_threads(args.trace.threads)?;
     let probes = file::read(&args.probes)?;
     let config = Config::parse(&probes.config, &format!("{}: its configuration", args.probes.display()))?;
@@ -79,14 +81,17 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
         times,
         started,
     };
+    let folder = |camera: &Camera| match args.camera.as_deref() {
+        Some("all") => args.output.join(folder_name(&camera.name)),
+        _ => args.output.clone(),
+    };
+    for camera in &cameras {
+        check_pictures(&folder(camera), &inputs)?;
+        check_apart_from(&scene, &pictures(&folder(camera)))?;
+    }
     let mut reports = Vec::new();
     for camera in &cameras {
-        let folder = if args.camera.as_deref() == Some("all") {
-            args.output.join(folder_name(&camera.name))
-        } else {
-            args.output.clone()
-        };
-        reports.push(render_camera(&run, camera, &folder)?);
+        reports.push(render_camera(&run, camera, &folder(camera))?);
     }
     if console.json {
         let json = if let [report] = &reports[..] {
@@ -100,6 +105,34 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
         console.print(&table(report))?;
     }
     console.print(&format!("wrote {}", args.output.display()))
+}
+
+/// Files that a camera's folder gets.
+const PICTURES: &[&str] = &[
+    "visibility_off.exr",
+    "visibility_off.png",
+    "visibility_on.exr",
+    "visibility_on.png",
+    "visibility_ray.exr",
+    "visibility_ray.png",
+    "leak.exr",
+    "leak.png",
+    "probes.png",
+    "report.json",
+];
+
+fn pictures(folder: &Path) -> Vec<Named> {
+    PICTURES.iter().map(|name| Named::new("-o", folder.join(name))).collect()
+}
+
+/// Refuses a folder in which not all pictures can be written, before any is made.
+fn check_pictures(folder: &Path, inputs: &[Named]) -> Result<()> {
+    check_folder(folder)?;
+    // In a folder that is not there nothing is in the way.
+    if folder.is_dir() {
+        check_outputs(&pictures(folder), inputs)?;
+    }
+    Ok(())
 }
 
 /// Whether the scene is another than the probes were baked from; an error unless allowed.

@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use safetensors::{Dtype, SafeTensors};
 use serde_json::{Map, Value, json};
 
+use crate::input::read_file;
 use crate::output::{OutputError, write_atomically};
 
 const METADATA_KEY: &str = "__metadata__";
@@ -104,7 +105,7 @@ impl Container {
 
     /// Reads a file and checks every hash. Allocates about twice the file's size, whatever its header says.
     pub fn read(path: &Path) -> Result<Container, FileError> {
-        let bytes = std::fs::read(path).map_err(|cause| FileError::Unreadable { path: path.to_owned(), cause })?;
+        let bytes = read_file(path).map_err(|cause| FileError::Unreadable { path: path.to_owned(), cause })?;
         let damaged = |what: String| FileError::Damaged { path: path.to_owned(), what };
         let parsed = SafeTensors::deserialize(&bytes).map_err(|e| damaged(format!("not safetensors ({e})")))?;
         let (header_length, metadata) =

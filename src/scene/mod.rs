@@ -23,6 +23,8 @@ pub use material::{AlphaMode, Material, MaterialIndex, Texels, Texture, TextureI
 pub use mesh::{Mesh, TriangleIndex};
 pub use options::{EnvironmentSource, EnvironmentSourceError, LoadOptions};
 
+use std::path::PathBuf;
+
 use glam::DVec3;
 
 /// A loaded scene. Immutable after loading; every index in it is in range and every number finite.
@@ -40,6 +42,8 @@ pub struct Scene {
     pub environment: Environment,
     /// BLAKE3 of every input byte: scene file, buffers, images and environment map, in the order of reading.
     pub blake3: String,
+    /// The files that were read, in that order.
+    pub files: Vec<PathBuf>,
     /// What the loader left out or replaced, one sentence each.
     pub warnings: Vec<String>,
     pub dropped: DroppedTriangles,

@@ -1,7 +1,6 @@
 //! Reading the files of a scene; every byte read goes into the scene's hash.
 
 use std::borrow::Cow;
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -10,11 +9,15 @@ use base64::alphabet;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use percent_encoding::percent_decode_str;
 
+use crate::input::read_file;
+
 /// Files read so far, and the hash over them in the order of reading.
 pub(super) struct Inputs {
     hasher: blake3::Hasher,
     /// Bytes of all files read: what a damaged header's counts are held against.
     pub bytes: u64,
+    /// Their paths.
+    pub files: Vec<PathBuf>,
 }
 
 /// Where a glTF `uri` leads.
@@ -26,16 +29,14 @@ pub(super) enum Resource {
 
 impl Inputs {
     pub fn new() -> Self {
-        Inputs { hasher: blake3::Hasher::new(), bytes: 0 }
+        Inputs { hasher: blake3::Hasher::new(), bytes: 0, files: Vec::new() }
     }
 
-    /// The whole of a regular file. Devices and pipes are refused: `/dev/zero` never ends.
+    /// The whole of a regular file.
     pub fn read(&mut self, path: &Path) -> io::Result<Vec<u8>> {
-        if !fs::metadata(path)?.is_file() {
-            return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
-        }
-        let bytes = fs::read(path)?;
+        let bytes = read_file(path)?;
         self.add(&bytes);
+        self.files.push(path.to_owned());
         Ok(bytes)
     }
 

@@ -97,6 +97,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
         cameras,
         environment,
         blake3: inputs.finish(),
+        files: inputs.files,
         warnings,
         dropped,
     })

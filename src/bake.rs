@@ -2,14 +2,19 @@
 //!
 //! `bake` runs it once; whatever compares configurations runs it many times on one [`World`].
 
+mod memory;
+mod predict;
+mod replay;
+
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use glam::Vec2;
+use glam::{Vec2, Vec3A};
 use rayon::prelude::*;
 
 use crate::config::{Config, PlanMode};
 use crate::light::World;
+use crate::memory::TooLittleMemory;
 use crate::plan::Plan;
 use crate::probe::capture::{Capture, EmissionTransport, ProbeCapture};
 use crate::probe::checkpoint;
@@ -29,14 +34,30 @@ use crate::progress::Progress;
 use crate::report::bake::{Numerics, Rays, Times};
 use crate::scene::Mesh;
 
+pub use self::memory::Memory;
+pub use self::predict::Prediction;
+
 /// Hits this far outside the hull of the probes, in spacings, still count as inside: rounding of the bounds.
 const HULL_TOLERANCE: f32 = 1e-3;
 
 /// Voxels per cell at which the survey decides whether moments are needed at all.
 const SURVEY_VOXELS: u32 = 4;
 
-/// Probes whose rays are logged at a time for the bare replay; bounds the log's memory.
-const REPLAY_CHUNK: usize = 256;
+/// Probes that are traced before the next are begun: bounds the memory of what is not kept, and of replay's logs.
+const CHUNK: usize = 256;
+/// The same in bytes, where captures are large; but never fewer than there are threads.
+const CHUNK_BYTES: u64 = 256 << 20;
+
+/// Why there is no bake.
+#[derive(Debug, thiserror::Error)]
+pub enum BakeError {
+    #[error(transparent)]
+    Grid(#[from] GridError),
+    #[error(transparent)]
+    Memory(#[from] TooLittleMemory),
+    #[error(transparent)]
+    File(#[from] FileError),
+}
 
 /// One bake's circumstances that are not part of the method.
 #[derive(Debug, Clone)]
@@ -72,6 +93,7 @@ pub struct Prepared<'w, 's> {
     pub plan: Plan,
     pub survey_rays: u64,
     pub survey_s: f64,
+    memory: Memory,
     /// Hull of the probes relative to the scene's origin, a little enlarged.
     hull: (glam::Vec3, glam::Vec3),
 }
@@ -94,9 +116,11 @@ pub fn prepare<'w, 's>(
     world: &'w World<'s>,
     config: &'w Config,
     circumstances: &Circumstances,
-) -> Result<Prepared<'w, 's>, GridError> {
+) -> Result<Prepared<'w, 's>, BakeError> {
     let started = Instant::now();
     let grid = Grid::new(&config.grid, world.scene)?;
+    let memory = Memory::of(config, &grid, &world.scene.mesh);
+    memory.check(config, 0)?;
     let mut placement_settings = config.placement.clone();
     placement_settings.keep_unsampled |= config.plan == PlanMode::KeepEverything;
     let bar = circumstances.progress.stage("placing", 1);
@@ -138,7 +162,7 @@ pub fn prepare<'w, 's>(
     let plan = Plan::new(world, config, &grid, &placement, surface.as_ref());
     let survey_s = started.elapsed().as_secs_f64();
     let hull = grid.hull(HULL_TOLERANCE);
-    Ok(Prepared { world, config, grid, placement, surface, plan, survey_rays, survey_s, hull })
+    Ok(Prepared { world, config, grid, placement, surface, plan, survey_rays, survey_s, memory, hull })
 }
 
 /// Active probes that no surface sees are not worth baking.
@@ -192,44 +216,9 @@ impl Prepared<'_, '_> {
         capture.probe(probe, position, |p| p.cmpge(low).all() && p.cmple(high).all())
     }
 
-    /// Rays per second of bare Embree over the rays of the capture, in its order.
-    pub fn raw_rays_per_s(&self, circumstances: &Circumstances) -> Option<f64> {
-        let capture = self.capture(circumstances);
-        let active = self.active();
-        let bar = circumstances.progress.stage("raw rays", active.len());
-        let (mut rays, mut seconds) = (0usize, 0.0);
-        for chunk in active.chunks(REPLAY_CHUNK) {
-            self.world.tracer.set_recording(true);
-            let record = |&probe: &usize| self.world.tracer.record(|| drop(self.trace(&capture, probe)));
-            let logs: Vec<_> = chunk.par_iter().map(record).collect();
-            self.world.tracer.set_recording(false);
-            let started = Instant::now();
-            logs.par_iter().for_each(|log| self.world.tracer.replay(log));
-            seconds += started.elapsed().as_secs_f64();
-            rays += logs.iter().map(|l| l.len()).sum::<usize>();
-            bar.inc(chunk.len() as u64);
-        }
-        bar.finish_and_clear();
-        (seconds > 0.0).then(|| rays as f64 / seconds)
-    }
-
-    /// Time and memory that the bake would take, from a few probes; seconds and bytes.
-    pub fn predict(&self, circumstances: &Circumstances) -> (f64, u64) {
-        /// Probes traced to predict.
-        const PILOT: usize = 32;
-        let capture = self.capture(circumstances);
-        let active = self.active();
-        let pilot: Vec<usize> = active.iter().copied().step_by(active.len().div_ceil(PILOT).max(1)).collect();
-        let started = Instant::now();
-        let traced: Vec<ProbeCapture> = pilot.par_iter().map(|&p| self.trace(&capture, p)).collect();
-        let share = active.len() as f64 / pilot.len().max(1) as f64;
-        let bytes = traced.iter().map(ProbeCapture::bytes).sum::<u64>() as f64 * share;
-        let budget = circumstances.memory_budget_bytes.unwrap_or(u64::MAX);
-        (self.survey_s + started.elapsed().as_secs_f64() * share, (bytes as u64).min(budget))
-    }
-
     /// Runs the rest of the pipeline. `load` and `accel_build` times are the caller's to fill.
-    pub fn bake(mut self, circumstances: &Circumstances, scene: &SceneRecord) -> Result<Baked, FileError> {
+    pub fn bake(mut self, circumstances: &Circumstances, scene: &SceneRecord) -> Result<Baked, BakeError> {
+        self.check_memory(circumstances)?;
         let config = self.config;
         let (filter, encoding) = (&config.filter, &config.encoding);
         let probes = self.grid.probe_count();
@@ -252,15 +241,10 @@ impl Prepared<'_, '_> {
         let started = Instant::now();
         let is_surface = matches!(config.query.visibility, VisibilitySettings::Surface { .. });
         let surface_bytes = self.surface.as_ref().filter(|_| is_surface).map_or(0, SurfaceVisibility::bytes);
-        let mut volume = Volume {
-            positions: self.placement.positions.clone(),
-            states: self.placement.states.clone(),
-            irradiance: OctahedralMaps::new(probes, filter.irradiance_resolution, encoding.border, glam::Vec3A::ZERO),
-            curve: encoding.curve,
-            distance: distance.clone().filter(|_| self.plan.visibility),
-            surface_visibility: self.surface.clone().filter(|_| is_surface && self.plan.visibility),
-            grid: self.grid.clone(),
-        };
+        let zero = OctahedralMaps::new(probes, filter.irradiance_resolution, encoding.border, Vec3A::ZERO);
+        // The maps are large: what the bounces do not ask for waits here, and is not copied.
+        let (asked, unasked) = if self.plan.visibility { (distance, None) } else { (None, distance) };
+        let mut volume = self.volume(zero, asked);
         let kernel = Kernel::cosine(config.capture.resolution, filter.irradiance_resolution);
         times.filter += started.elapsed().as_secs_f64();
 
@@ -273,7 +257,7 @@ impl Prepared<'_, '_> {
             settings: &config.solver,
             gathers_emission: config.capture.emission == EmissionTransport::Gathered,
         };
-        let identity = format!("{} seed {} {}", scene.blake3, circumstances.seed, config.to_ron());
+        let identity = checkpoint::identity(&scene.blake3, circumstances.seed, &config.to_ron());
         let mut progress = Solution::default();
         if let Some(Checkpoint { path, resume: true, .. }) = &circumstances.checkpoint
             && path.exists()
@@ -304,7 +288,7 @@ impl Prepared<'_, '_> {
 
         let started = Instant::now();
         if config.plan == PlanMode::KeepEverything {
-            volume.distance = distance;
+            volume.distance = volume.distance.or(unasked);
             volume.surface_visibility = self.surface.take().filter(|_| is_surface);
         }
         // Times stay out of the file: the same input must give the same bytes.
@@ -315,6 +299,20 @@ impl Prepared<'_, '_> {
         numerics.clamped = losses.clamped.clone();
         numerics.variance_floor_hits = losses.variance_floor_hits;
         Ok(Baked { volume, container, losses, solution, plan, rays, times, numerics, surface_bytes })
+    }
+
+    /// The volume before the first bounce.
+    fn volume(&self, irradiance: OctahedralMaps<Vec3A>, distance: Option<OctahedralMaps<Vec2>>) -> Volume {
+        let is_surface = matches!(self.config.query.visibility, VisibilitySettings::Surface { .. });
+        Volume {
+            positions: self.placement.positions.clone(),
+            states: self.placement.states.clone(),
+            irradiance,
+            curve: self.config.encoding.curve,
+            distance,
+            surface_visibility: self.surface.clone().filter(|_| is_surface && self.plan.visibility),
+            grid: self.grid.clone(),
+        }
     }
 
     /// Whether the method has distance maps and the plan or the configuration keeps them.
@@ -347,7 +345,8 @@ impl Prepared<'_, '_> {
         let mut stored: Vec<Option<ProbeCapture>> = (0..probes).map(|_| None).collect();
         let mut distance = kernel.map(|_| OctahedralMaps::new(probes, filter.distance_resolution, border, Vec2::ZERO));
         let mut bytes = 0;
-        for chunk in active.chunks(REPLAY_CHUNK) {
+        let at_once = (CHUNK_BYTES / memory::surfels_bytes(self.config).max(1)) as usize;
+        for chunk in active.chunks(at_once.clamp(rayon::current_num_threads().min(CHUNK), CHUNK)) {
             let traced: Vec<(ProbeCapture, Option<Vec<Vec2>>)> = chunk
                 .par_iter()
                 .map(|&probe| {

@@ -21,6 +21,7 @@ pub mod image;
 pub mod input;
 pub mod light;
 pub mod math;
+pub mod memory;
 pub mod output;
 pub mod plan;
 pub mod probe;

@@ -4,8 +4,9 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
+use glam::DVec3;
 
-use super::{Console, check_apart_from, inputs, load_scene, peak_memory_bytes, set_threads, write_json};
+use super::{Console, check_apart_from, tell, inputs, load_scene, peak_memory_bytes, set_threads, write_json};
 use crate::bake::{Baked, Checkpoint, Circumstances, Prepared, prepare};
 use crate::cli::BakeArgs;
 use crate::config::{Config, presets};
@@ -35,12 +36,15 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     let threads = set_threads(args.trace.threads)?;
 
     let started = Instant::now();
+    console.say(format!("configuration: {}", origin_of(args)));
     let scene = load_scene(path, &args.trace, &config, console)?;
     check_apart_from(&scene, &outputs)?;
     let load_s = started.elapsed().as_secs_f64();
+    tell::scene(console, path, &scene, load_s);
     let accel_started = Instant::now();
     let world = World::new(&scene, config.lights.punctual_scale, config.solver.albedo_max)?;
     let accel_build_s = accel_started.elapsed().as_secs_f64();
+    tell::accel(console, accel_build_s);
 
     let circumstances = Circumstances {
         seed: args.trace.seed,
@@ -52,12 +56,16 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
             interval: Checkpoint::INTERVAL,
         }),
     };
-    if let Some(Checkpoint { path, resume: true, .. }) = &circumstances.checkpoint
-        && !path.exists()
-    {
-        console.warn(format!("--resume: there is no {}; starting anew", path.display()));
+    if let Some(Checkpoint { path, resume: true, .. }) = &circumstances.checkpoint {
+        if path.exists() {
+            checkpoint::check(path, &checkpoint::identity(&scene.blake3, args.trace.seed, &config.to_ron()))?;
+        } else {
+            console.warn(format!("--resume: there is no {}; starting anew", path.display()));
+        }
     }
+    warn_about_bounds(&config, &scene, console);
     let prepared = prepare(&world, &config, &circumstances)?;
+    tell::prepared(console, &prepared);
     if args.dry_run {
         return dry_run(&prepared, &circumstances, console);
     }
@@ -66,12 +74,12 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     let raw_s = raw_started.elapsed().as_secs_f64();
     let record = SceneRecord { name: scene.name.clone(), blake3: scene.blake3.clone() };
     let mut baked = prepared.bake(&circumstances, &record)?;
+    tell::baked(console, &baked);
 
     let Some(output) = &args.output else { return Ok(()) };
     let write_started = Instant::now();
     let file_bytes = baked.container.write(output)?;
-    // The result stands: what it could have been resumed from is of no more use.
-    let _ = std::fs::remove_file(checkpoint::path_for(output));
+    checkpoint::remove(&checkpoint::path_for(output));
     baked.times.write = write_started.elapsed().as_secs_f64();
     baked.times.load = load_s;
     baked.times.accel_build = accel_build_s;
@@ -80,8 +88,10 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
 
     let report = report(&baked, &config, &scene, args.trace.seed, threads, file_bytes, raw);
     warn_about(&report, console);
+    tell::written(console, output);
     if let Some(path) = &args.report {
         write_json(path, &report)?;
+        tell::written(console, path);
     }
     if console.json {
         return console.print(&serde_json::to_string_pretty(&report)?);
@@ -122,26 +132,63 @@ fn resolve_config(args: &BakeArgs) -> Result<Config> {
     Ok(config)
 }
 
+/// Where the configuration in effect comes from.
+fn origin_of(args: &BakeArgs) -> String {
+    let base = match (&args.config, &args.preset) {
+        (Some(path), _) => path.display().to_string(),
+        (None, preset) => format!("preset {}", preset.as_deref().unwrap_or("default")),
+    };
+    args.set.iter().fold(base, |text, set| format!("{text}, --set {set}"))
+}
+
+/// Probes away from the scene can be meant, for a plain below them; more often a unit or an axis is wrong.
+fn warn_about_bounds(config: &Config, scene: &Scene, console: &Console) {
+    let (Some(bounds), Some((low, high))) = (config.grid.bounds, scene.mesh.bounds()) else { return };
+    let (low, high) = (scene.origin_world + low.as_dvec3(), scene.origin_world + high.as_dvec3());
+    if DVec3::from(bounds.max).cmplt(low).any() || DVec3::from(bounds.min).cmpgt(high).any() {
+        console.warn(format!(
+            "grid.bounds lie wholly outside of the scene, which spans {low} to {high} m: its surfaces use the probes at \
+             the rim"
+        ));
+    }
+}
+
 fn dry_run(prepared: &Prepared, circumstances: &Circumstances, console: &Console) -> Result<()> {
-    let (seconds, bytes) = prepared.predict(circumstances);
+    let p = prepared.predict(circumstances);
     let active = prepared.placement.states.iter().filter(|s| **s as u8 == 0).count();
     if console.json {
         let report = serde_json::json!({
             "schema": "lightprobe-plan/1",
             "probes": prepared.grid.probe_count(),
             "probes_active": active,
-            "predicted_time_s": seconds,
-            "predicted_memory_bytes": bytes,
+            "predicted_time_s": p.time_s(),
+            "predicted_survey_s": p.survey_s,
+            "predicted_capture_s": p.capture_s,
+            "predicted_bounce_s": p.bounce_s,
+            "predicted_bounces": p.bounces,
+            "predicted_memory_bytes": p.memory_bytes(),
+            "predicted_capture_bytes": p.capture_bytes,
+            "predicted_map_bytes": p.map_bytes,
+            "predicted_scene_bytes": p.resident_bytes,
             "plan": prepared.plan.lines,
         });
         return console.print(&serde_json::to_string_pretty(&report)?);
     }
     console.print(&plan_table(&prepared.plan.lines))?;
     console.print(&format!(
-        "{} probes, {active} of them to bake; about {} before the bounces and {} of captures in memory",
+        "{} probes, {active} of them to bake\n\
+         about {}: survey {}, capture {}, {} bounces of {} each\n\
+         about {} of memory: captures {}, maps and filters {}, scene and tables {}",
         prepared.grid.probe_count(),
-        format::seconds(seconds),
-        format::bytes(bytes),
+        format::seconds(p.time_s()),
+        format::seconds(p.survey_s),
+        format::seconds(p.capture_s),
+        p.bounces,
+        format::seconds(p.bounce_s),
+        format::bytes(p.memory_bytes()),
+        format::bytes(p.capture_bytes),
+        format::bytes(p.map_bytes),
+        format::bytes(p.resident_bytes),
     ))
 }
 
@@ -195,7 +242,7 @@ fn report(
             runtime: irradiance + visibility,
             runtime_kept: irradiance + if baked.plan.visibility { visibility } else { 0.0 },
             file: file_bytes as f64 / probes as f64,
-            tensors: baked.container.tensors.iter().map(|(n, t)| (n.clone(), t.bytes.len() as u64)).collect(),
+            tensors: baked.container.tensors.iter().map(|(n, t)| (n.clone(), t.bytes.len() as f64 / probes as f64)).collect(),
         },
         bounces: baked.solution.bounces.clone(),
         converged: baked.solution.converged,

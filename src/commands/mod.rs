@@ -3,6 +3,7 @@
 pub mod bake;
 pub mod inspect;
 pub mod render;
+mod tell;
 
 use std::io::Write;
 use std::path::Path;

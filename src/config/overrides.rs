@@ -1,31 +1,55 @@
 //! `--set key=value`: a path of keys with dots, and a value.
 
+use ron::error::SpannedError;
 use serde_json::Value;
 
-use super::{Config, ConfigError, unknown_key};
+use super::{Config, ConfigError, messages};
 
 /// Applies `key=value` assignments in order. Values are RON as in a configuration file, for example `0.5`, `f32`,
 /// `(3, 4, 5)` or `surface(voxels_per_cell: 4)`.
-pub fn apply(config: Config, assignments: &[String]) -> Result<Config, ConfigError> {
+pub fn apply(mut config: Config, assignments: &[String]) -> Result<Config, ConfigError> {
     // Plain records of numbers and enums: nothing in them can fail to serialise.
     let mut tree = serde_json::to_value(&config).unwrap_or_default();
+    // Checked one by one, so that the message names the assignment that does not fit.
     for assignment in assignments {
         let error = |what: String| ConfigError::Override { assignment: assignment.clone(), what };
+        let place = format!("--set {assignment}");
         let (path, value) = assignment
             .split_once('=')
             .ok_or_else(|| error("write it as key=value, for example grid.spacing_m=0.5".into()))?;
         let (path, value) = (path.trim(), value.trim());
-        let parsed = match from_ron(path, value) {
-            Some(parsed) => parsed,
+        let alone = from_ron(path, value);
+        if let Ok(alone) = &alone {
+            // Before JSON makes `null` of NaN and infinities, and so the default of a key that may be left out.
+            alone.check(&place)?;
+        }
+        let parsed = match &alone {
+            Ok(alone) => at_path(alone, path),
             // Paths into a choice (`query.visibility.moments.power`), and mistakes, which get their message below.
-            None => plain(value),
+            Err(_) => None,
         };
-        set(&mut tree, path, parsed).map_err(error)?;
-        // Checked one by one, so that the message names the assignment that does not fit.
-        serde_json::from_value::<Config>(tree.clone()).map_err(|e| error(e.to_string()))?;
+        set(&mut tree, path, parsed.unwrap_or_else(|| plain(value))).map_err(error)?;
+        config = serde_json::from_value::<Config>(tree.clone()).map_err(|e| error(explain(&e, &alone, value)))?;
+        config.check(&place)?;
+        if config.grid.spacing_m.is_some() && config.grid.divisions.is_some() {
+            let key = if path.ends_with("divisions") { "spacing_m" } else { "divisions" };
+            return Err(error(format!("grid.{key} is given too; remove one, or put --set grid.{key}=None before")));
+        }
     }
-    serde_json::from_value(tree)
-        .map_err(|e| ConfigError::Override { assignment: assignments.join(" "), what: e.to_string() })
+    Ok(config)
+}
+
+/// What is wrong with a value: RON knows it better where it is about names.
+fn explain(error: &serde_json::Error, alone: &Result<Config, SpannedError>, value: &str) -> String {
+    if let Some(message) = messages::without_parameters(value) {
+        return message;
+    }
+    match alone.as_ref().map_err(|e| &e.code) {
+        Err(code @ (ron::Error::NoSuchEnumVariant { .. } | ron::Error::NoSuchStructField { .. })) => {
+            messages::of_value(code, value)
+        }
+        _ => error.to_string(),
+    }
 }
 
 fn set(tree: &mut Value, path: &str, value: Value) -> Result<(), String> {
@@ -35,7 +59,7 @@ fn set(tree: &mut Value, path: &str, value: Value) -> Result<(), String> {
             return Err(format!("'{key}' cannot be set: what stands before it has no keys"));
         };
         if !map.contains_key(key) {
-            return Err(unknown_key(key, map.keys().map(String::as_str)));
+            return Err(messages::unknown_key(key, map.keys().map(String::as_str)));
         }
         node = &mut map[key];
     }
@@ -43,13 +67,16 @@ fn set(tree: &mut Value, path: &str, value: Value) -> Result<(), String> {
     Ok(())
 }
 
-/// The value as a configuration file with nothing but this key would have it.
-fn from_ron(path: &str, value: &str) -> Option<Value> {
-    let keys: Vec<&str> = path.split('.').collect();
-    let text = keys.iter().rev().fold(value.to_owned(), |inner, key| format!("({key}: {inner})"));
-    let config: Config = super::ron_options().from_str(&text).ok()?;
+/// A configuration file with nothing but this key.
+fn from_ron(path: &str, value: &str) -> Result<Config, SpannedError> {
+    let text = path.rsplit('.').fold(value.to_owned(), |inner, key| format!("({key}: {inner})"));
+    super::ron_options().from_str(&text)
+}
+
+/// What a configuration has at a path of keys.
+fn at_path(config: &Config, path: &str) -> Option<Value> {
     let tree = serde_json::to_value(config).ok()?;
-    keys.iter().try_fold(&tree, |node, key| node.get(key)).cloned()
+    path.split('.').try_fold(&tree, |node, key| node.get(key)).cloned()
 }
 
 /// A number, `true`, JSON, or else the name of a choice.
@@ -92,9 +119,49 @@ mod tests {
             ("encoding.irradiance=f64", "f64"),
             ("solver.albedo_max=2", "not including 1"),
             ("grid.spacing_m.x=1", "has no keys"),
+            ("encoding.irradiance=f61", "did you mean 'f16'"),
+            ("query.visibility=surface", "surface(voxels_per_cell: 8)"),
+            ("query.direction=cosine", "cosine(floor: 0.05)"),
+            ("query.visibility=surface(voxels: 8)", "did you mean 'voxels_per_cell'"),
+            ("grid.spacing_m=NaN", "positive"),
+            ("grid=(spacing_m: inf)", "positive"),
+            ("query.visibility=moments(power: 1e39, floor: 0)", "finite"),
         ] {
             let error = with(&[assignment]).unwrap_err().to_string();
             assert!(error.contains(expected), "{assignment}: {error}");
         }
+    }
+    /// NaN and infinities are no numbers of metres, shares or anything else, and no way of writing a default.
+    #[test]
+    fn no_key_takes_what_is_not_finite() {
+        fn leaves(node: &Value, path: String, out: &mut Vec<String>) {
+            match node {
+                Value::Object(map) => {
+                    map.iter().for_each(|(key, node)| leaves(node, format!("{path}.{key}"), out));
+                }
+                Value::Number(_) => out.push(path.trim_start_matches('.').to_owned()),
+                _ => {}
+            }
+        }
+        let mut paths = Vec::new();
+        leaves(&serde_json::to_value(Config::default()).unwrap(), String::new(), &mut paths);
+        assert!(paths.len() > 15, "{paths:?}");
+        for odd in ["NaN", "inf", "-inf", "1e400"] {
+            let optional = ["grid.spacing_m=X", "lights.sky=(X,0,0)", "grid.bounds=(min: (0,0,0), max: (1,X,1))"];
+            let assignments = paths.iter().map(|path| format!("{path}=X")).chain(optional.map(String::from));
+            for assignment in assignments.map(|a| a.replace('X', odd)) {
+                assert!(with(&[&assignment]).is_err(), "{assignment}");
+            }
+            let file = format!("(grid: (spacing_m: {odd}))");
+            assert!(Config::parse(&file, "a.ron").unwrap_err().to_string().contains("a.ron"), "{file}");
+        }
+    }
+
+    #[test]
+    fn a_spacing_gives_way_to_divisions_on_request() {
+        let error = with(&["grid.spacing_m=1", "grid.divisions=(2,2,2)"]).unwrap_err().to_string();
+        assert!(error.contains("--set grid.spacing_m=None"), "{error}");
+        let config = with(&["grid.spacing_m=1", "grid.spacing_m=None", "grid.divisions=(2,2,2)"]).unwrap();
+        assert_eq!((config.grid.spacing_m, config.grid.divisions), (None, Some((2, 2, 2))));
     }
 }

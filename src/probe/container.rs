@@ -32,8 +32,10 @@ pub enum FileError {
         "{path} has the format {found:?}, this program reads {expected:?}; use the program that wrote it, or bake again"
     )]
     Version { path: PathBuf, found: String, expected: &'static str },
+    #[error("{path} cannot be resumed from: {what}; delete it or leave --resume out")]
+    NoCheckpoint { path: PathBuf, what: String },
     #[error(
-        "{path} is from a bake of another scene, configuration or seed; resume with the same arguments, or delete it and start anew"
+        "{path} is from a bake of another scene, configuration or seed; resume with the same arguments, or delete it or leave --resume out"
     )]
     OtherBake { path: PathBuf },
     #[error(transparent)]

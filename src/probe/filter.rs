@@ -58,7 +58,8 @@ impl Kernel {
 
     /// Means under max(0, ω·d)^`exponent`.
     pub fn lobe(capture: usize, out: usize, exponent: f32) -> Kernel {
-        let mut kernel = Kernel { row_start: vec![0], entries: Vec::new() };
+        let entries = (Kernel::entries(capture, out, exponent) * 1.02) as usize;
+        let mut kernel = Kernel { row_start: vec![0], entries: Vec::with_capacity(entries) };
         let points = quadrature(capture);
         for o in 0..out * out {
             let axis = texel_direction(o % out, o / out, out);
@@ -69,6 +70,20 @@ impl Kernel {
             kernel.push_row(&row);
         }
         kernel
+    }
+
+    /// About how many weights a kernel has: capture texels in the cap around each output direction whose lobe is not
+    /// [`NEGLIGIBLE`]. A cap within the angle θ is (1 − cos θ)/2 of the sphere.
+    fn entries(capture: usize, out: usize, exponent: f32) -> f64 {
+        let share = (1.0 - f64::from(NEGLIGIBLE).powf(1.0 / f64::from(exponent))) / 2.0;
+        (out * out) as f64 * (capture * capture) as f64 * share
+    }
+
+    /// Memory of a kernel while it is made.
+    pub fn bytes(capture: usize, out: usize, exponent: f32) -> u64 {
+        let quadrature = (capture * capture * QUADRATURE * QUADRATURE * size_of::<(Vec3, f32)>()) as u64;
+        // `as` saturates.
+        (Kernel::entries(capture, out, exponent) * size_of::<(u32, f32)>() as f64) as u64 + quadrature
     }
 
     fn push_row(&mut self, weights: &[f32]) {

@@ -60,8 +60,13 @@ pub enum GridError {
     Padding(f64),
     #[error("grid.bounds: min {min} must be finite and not above max {max}")]
     Bounds { min: DVec3, max: DVec3 },
-    #[error("the grid would have {0} probes, more than 2^26: raise grid.spacing_m or lower grid.divisions")]
-    TooMany(u64),
+    #[error("the grid would have {} probes, more than 2^26: raise grid.spacing_m or lower grid.divisions", in_words(*.0))]
+    TooMany(f64),
+}
+
+/// A number of probes; rounded where no one counts.
+fn in_words(count: f64) -> String {
+    if count < 1e9 { count.to_string() } else { format!("about {count:.0e}") }
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -125,8 +130,9 @@ impl Grid {
                 cover(high - low, spacing, padding)?
             }
         };
-        let count = divisions.to_array().iter().map(|&n| u64::from(n)).product();
-        if count > MAX_PROBES {
+        // Exact as far as it is compared, and beyond that not wrapped.
+        let count: f64 = divisions.to_array().iter().map(|&n| f64::from(n)).product();
+        if count > MAX_PROBES as f64 {
             return Err(GridError::TooMany(count));
         }
         let origin = (low + high) / 2.0 - spacing * (divisions - UVec3::ONE).as_dvec3() / 2.0;
@@ -243,8 +249,9 @@ fn scene_bounds(scene: &Scene) -> (DVec3, DVec3) {
 /// Enough probes at this spacing that their hull covers the extent and the padding, as many on either side.
 fn cover(extent: DVec3, spacing: f64, padding: f64) -> Result<(DVec3, UVec3), GridError> {
     let cells = (extent / spacing + 2.0 * padding).ceil().max(DVec3::ONE);
+    // Before a long side is cut down to u32.
     if cells.max_element() > MAX_PROBES as f64 {
-        return Err(GridError::TooMany(cells.max_element() as u64));
+        return Err(GridError::TooMany((cells + 1.0).element_product()));
     }
     Ok((DVec3::splat(spacing), cells.as_uvec3() + UVec3::ONE))
 }

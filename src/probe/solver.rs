@@ -4,6 +4,8 @@
 //! query with the method's own weights: Jacobi's iteration for (I − T)B = B⁰, whose error shrinks by about the mean
 //! albedo per sweep.
 
+use std::time::Instant;
+
 use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -41,7 +43,9 @@ pub struct Bounce {
     pub index: u32,
     /// Largest change of any irradiance texel ÷ largest irradiance texel.
     pub residual: f64,
-    /// Mean luminance of all active probes' irradiance, W·m⁻².
+    /// Mean luminance of the irradiance that would be stored after this sweep: over all interior texels of active probes,
+    /// with the emission that probes see themselves, before encoding, W·m⁻². Known when all sweeps are done: until then
+    /// without emission that is sampled.
     pub energy: f64,
 }
 
@@ -129,7 +133,8 @@ impl<C: Captures> Solver<'_, C> {
             on_bounce(&progress, volume);
         }
         if !self.gathers_emission {
-            self.add_emission(volume);
+            let emitted = self.add_emission(volume);
+            progress.bounces.iter_mut().for_each(|bounce| bounce.energy += emitted);
         }
         progress
     }
@@ -137,53 +142,67 @@ impl<C: Captures> Solver<'_, C> {
     /// Of every probe's surfels: the corners of its cell that it sees, 0 where it must be looked up again. Neither
     /// surfels nor probes move, so once is enough; empty where the method does not store visibility at surfaces.
     fn masks(&self, volume: &Volume) -> Vec<Vec<u8>> {
-        let Some(surface) = &volume.surface_visibility else { return vec![Vec::new(); volume.states.len()] };
-        let of_probe = |p: usize| -> Vec<u8> {
-            if volume.states[p] != ProbeState::Active {
-                return Vec::new();
-            }
-            self.captures.with(p, |capture| {
-                capture.surfels.iter().map(|s| surface.look_up(&volume.grid, s.position, s.facing).mask).collect()
-            })
+        let of_probe = |p: usize| match volume.states[p] {
+            ProbeState::Active => self.masks_of(volume, p),
+            _ => Vec::new(),
         };
         (0..volume.states.len()).into_par_iter().map(of_probe).collect()
+    }
+
+    fn masks_of(&self, volume: &Volume, p: usize) -> Vec<u8> {
+        let Some(surface) = &volume.surface_visibility else { return Vec::new() };
+        self.captures.with(p, |capture| {
+            capture.surfels.iter().map(|s| surface.look_up(&volume.grid, s.position, s.facing).mask).collect()
+        })
     }
 
     /// Irradiance of every probe from the outgoing radiance that the present irradiance gives; without `masks` from the
     /// direct radiance alone.
     fn sweep(&self, volume: &Volume, masks: Option<&[Vec<u8>]>) -> Vec<Swept> {
-        let kernel = self.kernel;
-        let query = Query { volume, settings: self.query };
-        let probe = |p: usize| {
-            if volume.states[p] != ProbeState::Active {
-                return Swept::default();
-            }
-            self.captures.with(p, |capture| {
-                let mut radiance =
-                    if self.gathers_emission { capture.emitted_radiance() } else { vec![Vec3A::ZERO; capture.texels] };
-                let mut non_finite = 0;
-                for (i, surfel) in capture.surfels.iter().enumerate() {
-                    let mut outgoing = surfel.direct_radiance;
-                    if let Some(masks) = masks {
-                        let visibility = match masks[p].get(i) {
-                            None | Some(0) => Visibility::Stored,
-                            Some(&mask) => Visibility::Exact(mask),
-                        };
-                        let weights = query.weights(&self.query_point(surfel, volume.positions[p]), visibility);
-                        outgoing += reflected_radiance(surfel.albedo(), query.blend(&weights, surfel.oct()));
-                    }
-                    if outgoing.is_finite() {
-                        radiance[surfel.texel as usize] += Vec3A::from(outgoing);
-                    } else {
-                        non_finite += 1;
-                    }
-                }
-                let mut irradiance = vec![Vec3A::ZERO; kernel.rows()];
-                kernel.irradiance(&radiance, &mut irradiance);
-                Swept { irradiance, non_finite }
-            })
+        let probe = |p: usize| match volume.states[p] {
+            ProbeState::Active => self.sweep_probe(volume, p, masks.map(|masks| masks[p].as_slice())),
+            _ => Swept::default(),
         };
         (0..volume.states.len()).into_par_iter().map(probe).collect()
+    }
+
+    /// The same of one active probe, with the masks of its own surfels.
+    fn sweep_probe(&self, volume: &Volume, p: usize, masks: Option<&[u8]>) -> Swept {
+        let kernel = self.kernel;
+        let query = Query { volume, settings: self.query };
+        self.captures.with(p, |capture| {
+            let mut radiance =
+                if self.gathers_emission { capture.emitted_radiance() } else { vec![Vec3A::ZERO; capture.texels] };
+            let mut non_finite = 0;
+            for (i, surfel) in capture.surfels.iter().enumerate() {
+                let mut outgoing = surfel.direct_radiance;
+                if let Some(masks) = masks {
+                    let visibility = match masks.get(i) {
+                        None | Some(0) => Visibility::Stored,
+                        Some(&mask) => Visibility::Exact(mask),
+                    };
+                    let weights = query.weights(&self.query_point(surfel, volume.positions[p]), visibility);
+                    outgoing += reflected_radiance(surfel.albedo(), query.blend(&weights, surfel.oct()));
+                }
+                if outgoing.is_finite() {
+                    radiance[surfel.texel as usize] += Vec3A::from(outgoing);
+                } else {
+                    non_finite += 1;
+                }
+            }
+            let mut irradiance = vec![Vec3A::ZERO; kernel.rows()];
+            kernel.irradiance(&radiance, &mut irradiance);
+            Swept { irradiance, non_finite }
+        })
+    }
+
+    /// Seconds that a sweep over these probes takes.
+    pub fn time_sweep(&self, volume: &Volume, probes: &[usize]) -> f64 {
+        let masks: Vec<Vec<u8>> = probes.par_iter().map(|&p| self.masks_of(volume, p)).collect();
+        let started = Instant::now();
+        let sweep = |(&p, masks): (&usize, &Vec<u8>)| self.sweep_probe(volume, p, Some(masks));
+        std::hint::black_box(probes.par_iter().zip(&masks).map(sweep).collect::<Vec<_>>());
+        started.elapsed().as_secs_f64()
     }
 
     /// How a probe asks for the light at a surfel. What the method does not look at is left zero.
@@ -194,29 +213,37 @@ impl<C: Captures> Solver<'_, C> {
     }
 
     /// Adds the emitted light that probes see themselves: from their rays and from the emitters sampled at their centres.
-    fn add_emission(&self, volume: &mut Volume) {
+    /// Returns the mean luminance of the irradiance added, over all interior texels of active probes.
+    fn add_emission(&self, volume: &mut Volume) -> f64 {
         let kernel = self.kernel;
         let (resolution, border) = (volume.irradiance.resolution, volume.irradiance.border);
         let side = volume.irradiance.side();
         let curve = volume.curve;
         let n = volume.irradiance.texels_per_probe();
         let states = &volume.states;
-        volume.irradiance.texels.par_chunks_mut(n).enumerate().for_each(|(p, out)| {
+        let add = |(p, out): (usize, &mut [Vec3A])| {
             if states[p] != ProbeState::Active {
-                return;
+                return None;
             }
             self.captures.with(p, |capture| {
                 let mut emitted = vec![Vec3A::ZERO; kernel.rows()];
+                let mut energy = 0.0;
                 kernel.irradiance(&capture.emitted_radiance(), &mut emitted);
                 for (o, value) in emitted.iter_mut().enumerate() {
                     let at = (o / resolution + border) * side + o % resolution + border;
                     let normal = texel_direction(o % resolution, o / resolution, resolution);
-                    *value += curve.decode(out[at]) + Vec3A::from(capture.sampled_emitter_irradiance(normal));
-                    *value = curve.encode(*value);
+                    *value += Vec3A::from(capture.sampled_emitter_irradiance(normal));
+                    energy += f64::from(luminance((*value).into()));
+                    *value = curve.encode(*value + curve.decode(out[at]));
                 }
                 fill_with_border(&emitted, resolution, border, out);
-            });
-        });
+                Some(energy)
+            })
+        };
+        // Summed in order, on one thread: the same for any number of threads.
+        let energies: Vec<Option<f64>> = volume.irradiance.texels.par_chunks_mut(n).enumerate().map(add).collect();
+        let texels = energies.iter().flatten().count() * kernel.rows();
+        energies.iter().flatten().sum::<f64>() / texels.max(1) as f64
     }
 }
 

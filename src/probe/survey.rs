@@ -24,6 +24,28 @@ const SEARCH_POINTS: u32 = 32;
 /// divided surfaces need no more points than a wall of two triangles does.
 const GROUP_SEARCH_POINTS: u32 = 4 * SEARCH_POINTS;
 
+/// Memory that a survey takes at most: one [`Side`] for each side of a triangle in each voxel that it meets, twice while
+/// they are collected. A triangle meets as many voxels as its area covers, those along its edges, and one.
+pub fn estimated_bytes(mesh: &Mesh, grid: &Grid, voxels_per_cell: u32) -> u64 {
+    /// A tilted plane passes through more voxels than its area has faces, √3 times as many at most.
+    const TILT: f64 = 1.733;
+    let voxel_m = f64::from(grid.spacing.min_element()) / f64::from(voxels_per_cell);
+    let (low, high) = grid.hull(0.0);
+    let voxels = |t: u32| {
+        let corners = mesh.corners(TriangleIndex(t));
+        // The part of its box that lies in the grid: large triangles are many voxels, and may reach far beyond it.
+        let box_low = corners[0].min(corners[1]).min(corners[2]);
+        let box_high = corners[0].max(corners[1]).max(corners[2]);
+        let inside = (box_high.min(high) - box_low.max(low)).max(Vec3::ZERO).as_dvec3() / voxel_m + 1.0;
+        let faces = inside.x * inside.y + inside.y * inside.z + inside.z * inside.x;
+        let area = f64::from(mesh.area(TriangleIndex(t))) / (voxel_m * voxel_m);
+        let edges = (box_high - box_low).as_dvec3().length() / voxel_m;
+        (TILT * area + 2.0 * edges + 1.0).min(faces)
+    };
+    let total: f64 = (0..mesh.triangles.len() as u32).into_par_iter().map(voxels).sum();
+    (total * (2 * 2 * size_of::<Side>()) as f64) as u64
+}
+
 /// A table with what is known beside it while baking.
 #[derive(Debug, Clone)]
 pub struct Measured {

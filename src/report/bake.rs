@@ -67,7 +67,8 @@ pub struct BytesPerProbe {
     pub runtime_kept: f64,
     /// File size ÷ probes.
     pub file: f64,
-    pub tensors: BTreeMap<String, u64>,
+    /// Tensor size ÷ probes.
+    pub tensors: BTreeMap<String, f64>,
 }
 
 #[derive(Debug, Clone, Default, Serialize)]

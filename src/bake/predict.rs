@@ -1,0 +1,144 @@
+//! Time and memory of a bake, foretold from a few of its probes.
+
+use std::time::Instant;
+
+use glam::Vec3A;
+use rayon::prelude::*;
+
+use super::{Budgeted, Circumstances, Prepared};
+use crate::memory::{TooLittleMemory, resident_bytes};
+use crate::probe::capture::ProbeCapture;
+use crate::probe::filter::Kernel;
+use crate::probe::map::OctahedralMaps;
+use crate::probe::solver::Solver;
+
+/// Probes traced to predict.
+const PILOT: usize = 32;
+
+/// What a bake would take.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prediction {
+    /// Done already.
+    pub survey_s: f64,
+    pub capture_s: f64,
+    /// One bounce.
+    pub bounce_s: f64,
+    /// As many as the mean albedo that the probes see asks for.
+    pub bounces: u32,
+    /// Captures kept in memory.
+    pub capture_bytes: u64,
+    /// Maps with their copies, filters, what is traced at the same time.
+    pub map_bytes: u64,
+    /// What the process takes now: scene, acceleration structure, survey's tables.
+    pub resident_bytes: u64,
+}
+
+impl Prediction {
+    /// All stages but loading and writing.
+    pub fn time_s(&self) -> f64 {
+        self.survey_s + self.capture_s + f64::from(self.bounces) * self.bounce_s
+    }
+
+    pub fn memory_bytes(&self) -> u64 {
+        self.capture_bytes + self.map_bytes + self.resident_bytes
+    }
+}
+
+impl Prepared<'_, '_> {
+    /// Foretells time and memory from some of the probes, spread evenly.
+    pub fn predict(&self, circumstances: &Circumstances) -> Prediction {
+        let config = self.config;
+        let capture = self.capture(circumstances);
+        let (pilot, share) = self.pilot();
+        let started = Instant::now();
+        let traced: Vec<ProbeCapture> = pilot.par_iter().map(|&p| self.trace(&capture, p)).collect();
+        let capture_s = started.elapsed().as_secs_f64() * share;
+        let bytes = traced.iter().map(ProbeCapture::bytes).sum::<u64>() as f64 * share;
+
+        // Light that is lost at every bounce: what is not reflected, and what leaves the scene.
+        let seen: usize = traced.iter().map(|c| c.texels).sum();
+        let reflected: Vec3A = traced.iter().flat_map(|c| &c.surfels).map(|s| Vec3A::from(s.albedo())).sum();
+        let ratio = f64::from((reflected / seen.max(1) as f32).max_element()).min(f64::from(config.solver.albedo_max));
+
+        let filter = &config.filter;
+        let mut stored: Vec<Option<ProbeCapture>> = (0..self.grid.probe_count()).map(|_| None).collect();
+        pilot.iter().zip(traced).for_each(|(&probe, capture)| stored[probe] = Some(capture));
+        let trace = |probe: usize| self.trace(&capture, probe);
+        let kernel = Kernel::cosine(config.capture.resolution, filter.irradiance_resolution);
+        let solver = Solver {
+            captures: &Budgeted { stored, trace: &trace },
+            kernel: &kernel,
+            query: &config.query,
+            settings: &config.solver,
+            gathers_emission: false,
+        };
+        let zero = OctahedralMaps::new(
+            self.grid.probe_count(),
+            filter.irradiance_resolution,
+            config.encoding.border,
+            Vec3A::ZERO,
+        );
+        let mut retraced_s = 0.0;
+        let budget = circumstances.memory_budget_bytes.unwrap_or(u64::MAX);
+        if bytes > 0.0 && bytes > budget as f64 {
+            retraced_s = capture_s * (1.0 - budget as f64 / bytes);
+        }
+        Prediction {
+            survey_s: self.survey_s,
+            capture_s,
+            bounce_s: solver.time_sweep(&self.volume(zero, None), &pilot) * share + retraced_s,
+            bounces: expected_bounces(ratio, f64::from(config.solver.tolerance), config.solver.max_bounces),
+            capture_bytes: (bytes as u64).min(budget),
+            map_bytes: self.memory.standing(),
+            resident_bytes: resident_bytes(),
+        }
+    }
+
+    /// Refuses a bake whose captures do not fit beside its maps.
+    pub fn check_memory(&self, circumstances: &Circumstances) -> Result<(), TooLittleMemory> {
+        let budget = circumstances.memory_budget_bytes.unwrap_or(u64::MAX);
+        let most = (self.active().len() as u64).saturating_mul(super::memory::surfels_bytes(self.config));
+        let checked = self.memory.check(self.config, most.min(budget));
+        if checked.is_ok() || most == 0 {
+            return checked;
+        }
+        // Rays that leave the scene keep nothing: only tracing some tells how many these are.
+        let capture = self.capture(circumstances);
+        let (pilot, share) = self.pilot();
+        let bytes: u64 = pilot.par_iter().map(|&p| self.trace(&capture, p).bytes()).sum();
+        self.memory.check(self.config, ((bytes as f64 * share) as u64).min(budget))
+    }
+
+    /// Some active probes, and how many each of them stands for.
+    fn pilot(&self) -> (Vec<usize>, f64) {
+        let active = self.active();
+        let pilot: Vec<usize> = active.iter().copied().step_by(active.len().div_ceil(PILOT).max(1)).collect();
+        let share = active.len() as f64 / pilot.len().max(1) as f64;
+        (pilot, share)
+    }
+}
+
+/// Bounces after which a geometric series in `ratio` leaves less than `tolerance` of the light.
+fn expected_bounces(ratio: f64, tolerance: f64, most: u32) -> u32 {
+    if ratio <= 0.0 || tolerance <= 0.0 {
+        return if ratio <= 0.0 { most.min(1) } else { most };
+    }
+    let bounces = ((tolerance * (1.0 - ratio) / ratio).ln() / ratio.ln()).ceil();
+    // `as` saturates.
+    (bounces.max(1.0) as u32).min(most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_number_of_bounces_follows_from_the_albedo() {
+        // 0.5¹⁴ < 10⁻⁴ < 0.5¹³.
+        assert_eq!(expected_bounces(0.5, 1e-4, 64), 14);
+        assert_eq!(expected_bounces(0.999, 1e-4, 64), 64);
+        assert_eq!(expected_bounces(0.0, 1e-4, 64), 1);
+        assert_eq!(expected_bounces(0.5, 0.0, 64), 64);
+        assert_eq!(expected_bounces(0.5, 1e-4, 0), 0);
+    }
+}

@@ -1,0 +1,73 @@
+//! What `--verbose` says, one line each.
+
+use std::path::Path;
+
+use super::Console;
+use crate::bake::{Baked, Prepared};
+use crate::plan::Line;
+use crate::probe::placement::ProbeState;
+use crate::report::format;
+use crate::scene::Scene;
+
+pub fn scene(console: &Console, path: &Path, scene: &Scene, load_s: f64) {
+    console.say(format!(
+        "scene: {}, {} triangles, {} punctual lights, {} cameras, {} files, loaded in {}",
+        path.display(),
+        scene.mesh.triangles.len(),
+        scene.lights.len(),
+        scene.cameras.len(),
+        scene.files.len(),
+        format::seconds(load_s),
+    ));
+}
+
+pub fn accel(console: &Console, seconds: f64) {
+    console.say(format!("acceleration structure: built in {}", format::seconds(seconds)));
+}
+
+pub fn prepared(console: &Console, prepared: &Prepared) {
+    let grid = &prepared.grid;
+    let [x, y, z] = grid.divisions.to_array();
+    console.say(format!("grid: {x} × {y} × {z} probes, spacing {} m, origin {} m", grid.spacing, grid.origin_world));
+    let placement = &prepared.placement;
+    let count = |state| placement.states.iter().filter(|&&s| s == state).count();
+    console.say(format!(
+        "placement: {} probes active, {} inside geometry, {} never sampled, {} moved; with the survey {} rays in {}",
+        count(ProbeState::Active),
+        count(ProbeState::InsideGeometry),
+        count(ProbeState::NeverSampled),
+        placement.relocated,
+        prepared.survey_rays,
+        format::seconds(prepared.survey_s),
+    ));
+    prepared.plan.lines.iter().for_each(|line| plan_line(console, line));
+}
+
+pub fn plan_line(console: &Console, line: &Line) {
+    let kept = if line.kept { "kept" } else { "left out" };
+    console.say(format!("plan: {} {kept}: {}", line.stage, line.reason));
+}
+
+pub fn baked(console: &Console, baked: &Baked) {
+    let times = &baked.times;
+    console.say(format!(
+        "capture: {} primary and {} shadow rays in {}",
+        baked.rays.primary,
+        baked.rays.shadow,
+        format::seconds(times.capture)
+    ));
+    console.say(format!(
+        "bounces: {} in {}, {}",
+        baked.solution.bounces.len().saturating_sub(1),
+        format::seconds(times.bounces),
+        if baked.solution.converged { "converged" } else { "not converged" }
+    ));
+    console.say(format!("encoding: {}", format::seconds(times.encode)));
+    // The lines before were said before the work.
+    baked.plan.lines.iter().filter(|line| line.stage == "bounces").for_each(|line| plan_line(console, line));
+}
+
+pub fn written(console: &Console, path: &Path) {
+    let bytes = std::fs::metadata(path).map_or(0, |file| file.len());
+    console.say(format!("wrote {}, {}", path.display(), format::bytes(bytes)));
+}

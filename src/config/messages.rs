@@ -1,0 +1,81 @@
+//! Mistakes in a configuration in words, with the nearest known name where a name is wrong.
+
+use ron::error::SpannedError;
+
+/// Choices with parameters, and how they are written.
+const FORMS: &[(&str, &str)] = &[
+    ("cosine", "cosine(floor: 0.05)"),
+    ("wrap", "wrap(offset: 0.2)"),
+    ("moments", "moments(power: 3, floor: 0.05)"),
+    ("surface", "surface(voxels_per_cell: 8)"),
+];
+
+/// What is wrong in a configuration file of this text.
+pub fn of_file(error: &SpannedError, text: &str) -> String {
+    if text.trim().is_empty() {
+        return "it is empty; write () for the defaults".to_owned();
+    }
+    // The identifier that stands before the place of the error.
+    let line = text.lines().nth(error.span.start.line.saturating_sub(1)).unwrap_or("");
+    let before: String = line.chars().take(error.span.start.col.saturating_sub(1)).collect();
+    let is_part = |c: char| c.is_alphanumeric() || c == '_';
+    let start = before.trim_end().rfind(|c| !is_part(c)).map_or(0, |at| at + 1);
+    of_value(&error.code, before.trim_end().get(start..).unwrap_or(""))
+}
+
+/// What RON found wrong with a value.
+pub fn of_value(error: &ron::Error, value: &str) -> String {
+    match error {
+        ron::Error::NoSuchStructField { expected, found, .. } => unknown_key(found, expected.iter().copied()),
+        ron::Error::NoSuchEnumVariant { expected, found, .. } => {
+            let choices = expected.join(", ");
+            format!("there is no choice '{found}'{}; the choices are {choices}", suggestion(found, expected.iter()))
+        }
+        ron::Error::ExpectedNamedStructLike("Config") => {
+            "the keys stand in parentheses, as in (grid: (spacing_m: 0.5)); () gives the defaults".to_owned()
+        }
+        other => without_parameters(value).unwrap_or_else(|| other.to_string()),
+    }
+}
+
+/// Message for a choice whose parameters are missing.
+pub fn without_parameters(value: &str) -> Option<String> {
+    let (name, form) = FORMS.iter().find(|(name, _)| *name == value)?;
+    Some(format!("'{name}' needs its parameters: write it as {form}"))
+}
+
+/// Message for a key that does not exist.
+pub fn unknown_key<'k>(found: &str, known: impl Iterator<Item = &'k str> + Clone) -> String {
+    let names: Vec<&str> = known.clone().collect();
+    format!("there is no key '{found}'{}; the keys here are {}", suggestion(found, names.iter()), names.join(", "))
+}
+
+/// The nearest known name, where it is near enough that it may have been meant.
+fn suggestion<'k>(found: &str, known: impl Iterator<Item = &'k &'k str>) -> String {
+    let distance = |name: &str| match name.starts_with(found) && found.len() >= 3 {
+        true => 0,
+        false => strsim::damerau_levenshtein(name, found),
+    };
+    let nearest = known.map(|name| (distance(name), *name)).min();
+    match nearest {
+        // Half the letters wrong is another word.
+        Some((distance, name)) if 2 * distance < found.chars().count() => format!(" (did you mean '{name}'?)"),
+        _ => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_near_names_are_suggested() {
+        let keys = ["spacing_m", "bounds", "grid"];
+        for (found, meant) in [("spacing", "spacing_m"), ("gird", "grid"), ("bouds", "bounds")] {
+            let message = unknown_key(found, keys.into_iter());
+            assert!(message.contains(&format!("did you mean '{meant}'")), "{message}");
+        }
+        let message = unknown_key("seed", keys.into_iter());
+        assert!(!message.contains("did you mean") && message.contains("spacing_m, bounds, grid"), "{message}");
+    }
+}

@@ -50,10 +50,10 @@ pub struct TraceArgs {
     #[arg(long, value_name = "FILE.hdr|FILE.exr|R,G,B", value_parser = EnvironmentSource::from_str, allow_hyphen_values = true)]
     pub env: Option<EnvironmentSource>,
     /// Seed of all random numbers.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     pub seed: u64,
     /// Threads to use; 0 means one per core. The result does not depend on it.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     pub threads: usize,
 }
 
@@ -79,7 +79,7 @@ pub struct BakeArgs {
     /// Also write the report to this file.
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,
-    /// Print the plan with predicted time and memory, and stop.
+    /// Print the plan with predicted time (bounces included) and memory (captures, maps, scene), and stop.
     #[arg(long)]
     pub dry_run: bool,
     /// Print the effective configuration, and stop.
@@ -89,9 +89,10 @@ pub struct BakeArgs {
     #[arg(long)]
     pub measure_raw: bool,
     /// Most memory for captured surfaces; what does not fit is traced again at every bounce, with the same result.
-    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    #[arg(long, value_name = "SIZE", value_parser = parse_size, allow_negative_numbers = true)]
     pub memory_budget: Option<u64>,
-    /// Continue an interrupted bake of the same scene, configuration and seed from OUT.probes.resume.
+    /// Continue an interrupted bake of the same scene, configuration and seed from OUT.probes.resume, which is saved every
+    /// 10 s while bounces run.
     #[arg(long)]
     pub resume: bool,
 }
@@ -110,13 +111,13 @@ pub struct RenderArgs {
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
     /// Camera of the scene by name or number, or `all` (a subfolder each); the first where not given.
-    #[arg(long, value_name = "NAME|INDEX|all", conflicts_with = "look_at")]
+    #[arg(long, value_name = "NAME|INDEX|all", conflicts_with = "look_at", allow_negative_numbers = true)]
     pub camera: Option<String>,
     /// Camera by origin and target, metres in world space, and vertical field of view in degrees (60 where not given).
     #[arg(long, value_name = "ox,oy,oz,tx,ty,tz[,fov]", value_parser = LookAt::from_str, allow_hyphen_values = true)]
     pub look_at: Option<LookAt>,
     /// Size of the pictures in pixels.
-    #[arg(long, value_name = "WxH", default_value = "640x360", value_parser = Size::from_str)]
+    #[arg(long, value_name = "WxH", default_value = "640x360", value_parser = Size::from_str, allow_hyphen_values = true)]
     pub size: Size,
     /// Exposure of the PNG pictures, in powers of two; from the picture where not given.
     #[arg(long, value_name = "EV", allow_hyphen_values = true, value_parser = parse_exposure)]
@@ -132,7 +133,7 @@ pub struct InspectArgs {
     #[arg(value_name = "PROBES")]
     pub probes: PathBuf,
     /// Also print one probe: position, state, irradiance along the six axes.
-    #[arg(long, value_name = "I")]
+    #[arg(long, value_name = "I", allow_negative_numbers = true)]
     pub probe: Option<u32>,
 }
 

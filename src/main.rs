@@ -1,5 +1,6 @@
 //! Arguments → command → exit code.
 
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -10,11 +11,28 @@ use lightprobe::commands;
 const EXIT_ERROR: u8 = 2;
 
 fn main() -> ExitCode {
-    match commands::run(Cli::parse()) {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(message) => return print(&message),
+    };
+    match commands::run(cli) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");
             ExitCode::from(EXIT_ERROR)
         }
+    }
+}
+
+/// Prints help, the version, or what is wrong with the arguments.
+fn print(message: &clap::Error) -> ExitCode {
+    let printed = message.print().and_then(|()| std::io::stdout().flush());
+    match printed {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            eprintln!("error: cannot write to standard output: {error}");
+            ExitCode::from(EXIT_ERROR)
+        }
+        _ if message.use_stderr() => ExitCode::from(EXIT_ERROR),
+        _ => ExitCode::SUCCESS,
     }
 }

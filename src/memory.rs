@@ -73,7 +73,9 @@ fn group_limit(root: &str, group: &str, [limit, usage]: [&str; 2]) -> Option<u64
         // Cached files count as used, and give way.
         let text = fs::read_to_string(folder.join("memory.stat")).unwrap_or_default();
         let cached = text.lines().find_map(|line| {
-            line.strip_prefix("inactive_file ").or(line.strip_prefix("total_inactive_file ")).and_then(|n| n.parse().ok())
+            line.strip_prefix("inactive_file ")
+                .or(line.strip_prefix("total_inactive_file "))
+                .and_then(|n| n.parse().ok())
         });
         let used = number(&folder.join(usage)).unwrap_or(0).saturating_sub(cached.unwrap_or(0));
         Some(limit.saturating_sub(used))

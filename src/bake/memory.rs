@@ -24,8 +24,10 @@ const PLAIN_TEXEL_BYTES: u64 = 12;
 const DISTANCE_TEXEL_BYTES: u64 = 8 + 8;
 /// Moments of distance: three f64 for each captured texel, until they are filtered.
 const MOMENTS_BYTES: u64 = 24;
-/// The mask that the bounces keep of every surfel.
-const MASK_BYTES: u64 = 1;
+/// A captured surface with the mask that the bounces keep of it.
+pub const SURFEL_BYTES: u64 = size_of::<Surfel>() as u64 + 1;
+/// A texel that emits, in a list that grows by doubling.
+pub const EMITTED_BYTES: u64 = 2 * size_of::<(u32, glam::Vec3)>() as u64;
 
 /// Bytes of a bake's large arrays, by what they grow with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -119,5 +121,5 @@ impl Memory {
 /// Most that one probe's captured surfaces can take.
 pub fn surfels_bytes(config: &Config) -> u64 {
     let rays = config.capture.resolution.pow(2) as u64 * config.capture.samples_per_texel as u64;
-    rays * (size_of::<Surfel>() as u64 + MASK_BYTES)
+    rays * SURFEL_BYTES
 }

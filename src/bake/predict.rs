@@ -2,15 +2,18 @@
 
 use std::time::Instant;
 
-use glam::Vec3A;
+use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
 
-use super::{Budgeted, Circumstances, Prepared};
+use super::memory::{EMITTED_BYTES, SURFEL_BYTES, surfels_bytes};
+use super::{Budgeted, CHUNK_BYTES, Circumstances, Prepared};
+use crate::math::fibonacci;
 use crate::memory::{TooLittleMemory, resident_bytes};
 use crate::probe::capture::ProbeCapture;
 use crate::probe::filter::Kernel;
 use crate::probe::map::OctahedralMaps;
 use crate::probe::solver::Solver;
+use crate::trace::Ray;
 
 /// Probes traced to predict.
 const PILOT: usize = 32;
@@ -49,7 +52,9 @@ impl Prepared<'_, '_> {
     pub fn predict(&self, circumstances: &Circumstances) -> Prediction {
         let config = self.config;
         let capture = self.capture(circumstances);
-        let (pilot, share) = self.pilot();
+        // Large captures are alike, and few of them fit into memory.
+        let fitting = (CHUNK_BYTES / surfels_bytes(config).max(1)) as usize;
+        let (pilot, share) = self.pilot(fitting.clamp(1, PILOT));
         let started = Instant::now();
         let traced: Vec<ProbeCapture> = pilot.par_iter().map(|&p| self.trace(&capture, p)).collect();
         let capture_s = started.elapsed().as_secs_f64() * share;
@@ -97,22 +102,40 @@ impl Prepared<'_, '_> {
     /// Refuses a bake whose captures do not fit beside its maps.
     pub fn check_memory(&self, circumstances: &Circumstances) -> Result<(), TooLittleMemory> {
         let budget = circumstances.memory_budget_bytes.unwrap_or(u64::MAX);
-        let most = (self.active().len() as u64).saturating_mul(super::memory::surfels_bytes(self.config));
+        let most = (self.active().len() as u64).saturating_mul(surfels_bytes(self.config));
         let checked = self.memory.check(self.config, most.min(budget));
-        if checked.is_ok() || most == 0 {
+        if checked.is_ok() {
             return checked;
         }
-        // Rays that leave the scene keep nothing: only tracing some tells how many these are.
-        let capture = self.capture(circumstances);
-        let (pilot, share) = self.pilot();
-        let bytes: u64 = pilot.par_iter().map(|&p| self.trace(&capture, p).bytes()).sum();
-        self.memory.check(self.config, ((bytes as f64 * share) as u64).min(budget))
+        // Rays that leave the scene keep little: some tell how many these are.
+        self.memory.check(self.config, ((most as f64 * self.kept_share()) as u64).min(budget))
     }
 
-    /// Some active probes, and how many each of them stands for.
-    fn pilot(&self) -> (Vec<usize>, f64) {
+    /// Share of the most memory that captures could take, from a few rays of some probes.
+    fn kept_share(&self) -> f64 {
+        /// Rays of each pilot: their share is known to some percent in all.
+        const RAYS: usize = 256;
+        let (pilot, _) = self.pilot(PILOT);
+        let kept = |&probe: &usize| -> f64 {
+            let ray = |i| Ray::new(self.placement.positions[probe], fibonacci::direction(i, RAYS), i as u32);
+            let bytes = |i| match self.world.surface(ray(i)) {
+                Some(surface) => {
+                    let surfel = if surface.albedo == Vec3::ZERO { 0 } else { SURFEL_BYTES };
+                    surfel + if surface.emission == Vec3::ZERO { 0 } else { EMITTED_BYTES }
+                }
+                None if self.world.emitters.has_sky() => EMITTED_BYTES,
+                None => 0,
+            };
+            (0..RAYS).map(bytes).sum::<u64>() as f64
+        };
+        let sum: f64 = pilot.iter().map(kept).sum();
+        sum / (SURFEL_BYTES as f64 * (pilot.len() * RAYS).max(1) as f64)
+    }
+
+    /// At most so many active probes, spread evenly, and how many each of them stands for.
+    fn pilot(&self, most: usize) -> (Vec<usize>, f64) {
         let active = self.active();
-        let pilot: Vec<usize> = active.iter().copied().step_by(active.len().div_ceil(PILOT).max(1)).collect();
+        let pilot: Vec<usize> = active.iter().copied().step_by(active.len().div_ceil(most).max(1)).collect();
         let share = active.len() as f64 / pilot.len().max(1) as f64;
         (pilot, share)
     }

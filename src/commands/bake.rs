@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use glam::DVec3;
 
-use super::{Console, check_apart_from, tell, inputs, load_scene, peak_memory_bytes, set_threads, write_json};
+use super::{Console, check_apart_from, inputs, load_scene, peak_memory_bytes, set_threads, tell, write_json};
 use crate::bake::{Baked, Checkpoint, Circumstances, Prepared, prepare};
 use crate::cli::BakeArgs;
 use crate::config::{Config, presets};
@@ -242,7 +242,12 @@ fn report(
             runtime: irradiance + visibility,
             runtime_kept: irradiance + if baked.plan.visibility { visibility } else { 0.0 },
             file: file_bytes as f64 / probes as f64,
-            tensors: baked.container.tensors.iter().map(|(n, t)| (n.clone(), t.bytes.len() as f64 / probes as f64)).collect(),
+            tensors: baked
+                .container
+                .tensors
+                .iter()
+                .map(|(n, t)| (n.clone(), t.bytes.len() as f64 / probes as f64))
+                .collect(),
         },
         bounces: baked.solution.bounces.clone(),
         converged: baked.solution.converged,

@@ -1,10 +1,12 @@
 //! `lightprobe inspect`: what a probe file holds.
 
+use std::time::Instant;
+
 use anyhow::{Result, ensure};
 use glam::Vec3;
 use serde_json::{Value, json};
 
-use super::Console;
+use super::{Console, tell};
 use crate::cli::InspectArgs;
 use crate::probe::file::{self, FORMAT, ProbeFile};
 use crate::probe::placement::ProbeState;
@@ -13,7 +15,10 @@ use crate::report::format;
 use crate::report::table::{Column, Table};
 
 pub fn run(args: &InspectArgs, console: &Console) -> Result<()> {
+    let started = Instant::now();
     let file = file::read(&args.probes)?;
+    tell::probes(console, &args.probes, &file);
+    console.say(format!("read and checked in {}", format::seconds(started.elapsed().as_secs_f64())));
     let volume = file.volume_in_grid();
     if let Some(probe) = args.probe {
         let count = volume.states.len();

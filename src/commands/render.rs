@@ -1,18 +1,21 @@
 //! `lightprobe render`: scene + probes → pictures and report.
 
+mod check;
+
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use glam::{DVec3, Vec3};
 
-use super::{Console, check_apart_from, inputs, load_scene, peak_memory_bytes, set_threads, write_json};
+use self::check::{PICTURES, check_pictures, check_view, pictures};
+use super::{Console, check_apart_from, inputs, load_scene, peak_memory_bytes, set_threads, tell, write_json};
 use crate::cli::{LookAt, RenderArgs};
 use crate::config::Config;
 use crate::image::{LayeredImage, Picture8};
 use crate::light::World;
 use crate::math::color::luminance;
-use crate::output::{Named, check_folder, check_outputs, create_folder};
+use crate::output::{Named, create_folder};
 use crate::probe::file::{self, ProbeFile};
 use crate::probe::query::{Query, VisibilitySettings};
 use crate::probe::{Volume, layout};
@@ -20,6 +23,7 @@ use crate::report::colormap::Scale;
 use crate::report::format;
 use crate::report::heatmap::{Heatmap, range_of};
 use crate::report::leak;
+use crate::report::probe_key::{Entry, with_key};
 use crate::report::render::{MethodReport, RenderReport, RenderTimes, SCHEMA, Spread};
 use crate::report::table::{Column, Table};
 use crate::scene::{Camera, Scene};
@@ -28,6 +32,13 @@ use crate::shade::layers::{compose, to_pixels};
 use crate::shade::methods::{Method, exact_masks, irradiance, time_lookup, time_shading};
 use crate::shade::points::{View, see};
 use crate::shade::spheres;
+
+/// What the colours in `probes.png` mean.
+const PROBE_KEY: &[Entry] = &[
+    Entry { color: [40, 40, 40], rim: spheres::RIM_COLOR, meaning: "probe, a white sphere in its own light" },
+    Entry { color: spheres::INSIDE_COLOR, rim: spheres::RIM_COLOR, meaning: "inside geometry" },
+    Entry { color: spheres::UNSAMPLED_COLOR, rim: spheres::RIM_COLOR, meaning: "never sampled" },
+];
 
 /// What all cameras of a run share.
 struct Run<'a> {
@@ -61,10 +72,13 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
     let scene = load_scene(&args.scene, &args.trace, &config, console)?;
     let scene_changed = check_scene(args, &probes, &scene, console)?;
     let mut times = RenderTimes { load: started.elapsed().as_secs_f64(), ..Default::default() };
+    tell::scene(console, &args.scene, &scene, times.load);
 
     let accel_started = Instant::now();
     let world = World::new(&scene, config.lights.punctual_scale, config.solver.albedo_max)?;
     times.accel_build = accel_started.elapsed().as_secs_f64();
+    tell::accel(console, times.accel_build);
+    tell::probes(console, &args.probes, &probes);
 
     let volume = volume_as_planned(&probes, &scene);
     let bytes_per_probe = runtime_bytes(&probes, &config);
@@ -88,6 +102,7 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
     for camera in &cameras {
         check_pictures(&folder(camera), &inputs)?;
         check_apart_from(&scene, &pictures(&folder(camera)))?;
+        check_view(args, &world, camera, console)?;
     }
     let mut reports = Vec::new();
     for camera in &cameras {
@@ -105,34 +120,6 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
         console.print(&table(report))?;
     }
     console.print(&format!("wrote {}", args.output.display()))
-}
-
-/// Files that a camera's folder gets.
-const PICTURES: &[&str] = &[
-    "visibility_off.exr",
-    "visibility_off.png",
-    "visibility_on.exr",
-    "visibility_on.png",
-    "visibility_ray.exr",
-    "visibility_ray.png",
-    "leak.exr",
-    "leak.png",
-    "probes.png",
-    "report.json",
-];
-
-fn pictures(folder: &Path) -> Vec<Named> {
-    PICTURES.iter().map(|name| Named::new("-o", folder.join(name))).collect()
-}
-
-/// Refuses a folder in which not all pictures can be written, before any is made.
-fn check_pictures(folder: &Path, inputs: &[Named]) -> Result<()> {
-    check_folder(folder)?;
-    // In a folder that is not there nothing is in the way.
-    if folder.is_dir() {
-        check_outputs(&pictures(folder), inputs)?;
-    }
-    Ok(())
 }
 
 /// Whether the scene is another than the probes were baked from; an error unless allowed.
@@ -270,6 +257,8 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
         methods: shaded.into_iter().map(|s| s.report).collect(),
     };
     write_json(&folder.join("report.json"), &report)?;
+    tell::rendered(run.console, &report);
+    PICTURES.iter().for_each(|name| tell::written(run.console, &folder.join(name)));
     Ok(report)
 }
 
@@ -314,7 +303,7 @@ fn write_pictures(
     image.write_exr(&file("leak", "exr"))?;
     leak_map(view, &off_leak, &on_leak).write_png(&file("leak", "png"))?;
     let probes = spheres::draw(&tonemapped(&exact.image), view, camera, run.volume, exposure_ev);
-    probes.write_png(&file("probes", "png"))?;
+    with_key(&probes, PROBE_KEY).write_png(&file("probes", "png"))?;
     Ok(())
 }
 

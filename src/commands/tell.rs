@@ -5,8 +5,10 @@ use std::path::Path;
 use super::Console;
 use crate::bake::{Baked, Prepared};
 use crate::plan::Line;
+use crate::probe::file::ProbeFile;
 use crate::probe::placement::ProbeState;
 use crate::report::format;
+use crate::report::render::RenderReport;
 use crate::scene::Scene;
 
 pub fn scene(console: &Console, path: &Path, scene: &Scene, load_s: f64) {
@@ -65,6 +67,36 @@ pub fn baked(console: &Console, baked: &Baked) {
     console.say(format!("encoding: {}", format::seconds(times.encode)));
     // The lines before were said before the work.
     baked.plan.lines.iter().filter(|line| line.stage == "bounces").for_each(|line| plan_line(console, line));
+}
+
+pub fn probes(console: &Console, path: &Path, file: &ProbeFile) {
+    let [x, y, z] = file.volume_in_grid().grid.divisions.to_array();
+    console.say(format!(
+        "probes: {}, {}, {x} × {y} × {z}, {} active, all hashes match",
+        path.display(),
+        format::bytes(file.file_bytes),
+        file.volume_in_grid().active_count(),
+    ));
+}
+
+pub fn rendered(console: &Console, report: &RenderReport) {
+    console.say(format!(
+        "camera {}: {} points in {}×{} pixels, primary rays in {}, exposure {:+.2} EV",
+        report.camera,
+        report.points,
+        report.width,
+        report.height,
+        format::seconds(report.time_s.primary),
+        report.exposure_ev,
+    ));
+    for method in &report.methods {
+        console.say(format!(
+            "{}: shading {}, rays {}",
+            method.name,
+            format::seconds(method.shade_ms.median / 1e3),
+            format::seconds(method.ray_ms / 1e3),
+        ));
+    }
 }
 
 pub fn written(console: &Console, path: &Path) {

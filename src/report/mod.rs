@@ -8,6 +8,7 @@ pub mod format;
 pub mod heatmap;
 pub mod leak;
 pub mod legend;
+pub mod probe_key;
 pub mod render;
 pub mod table;
 pub mod text;

@@ -3,5 +3,6 @@
 pub mod framing;
 pub mod layers;
 pub mod methods;
+pub mod outlook;
 pub mod points;
 pub mod spheres;

@@ -13,8 +13,15 @@ use crate::scene::camera::Projection;
 const RADIUS: f32 = 0.08;
 
 /// sRGB colours of probes inside geometry and of those that no surface samples.
-const INSIDE_COLOR: [u8; 3] = [214, 48, 49];
-const UNSAMPLED_COLOR: [u8; 3] = [9, 132, 227];
+pub const INSIDE_COLOR: [u8; 3] = [214, 48, 49];
+pub const UNSAMPLED_COLOR: [u8; 3] = [9, 132, 227];
+
+/// Around every sphere, so that one in the dark stands out from the dark behind it.
+pub const RIM_COLOR: [u8; 3] = [200, 204, 208];
+
+/// Width of the rim in pixels, as far as the sphere is wide enough; at most this share of its radius.
+const RIM_PX: f32 = 1.2;
+const RIM_SHARE: f32 = 0.25;
 
 /// Draws the probes over a picture of the scene. Probes hidden behind surfaces stay hidden.
 pub fn draw(scene_picture: &Picture8, view: &View, camera: &Camera, volume: &Volume, exposure_ev: f32) -> Picture8 {
@@ -28,7 +35,8 @@ pub fn draw(scene_picture: &Picture8, view: &View, camera: &Camera, volume: &Vol
     let radius = RADIUS * volume.grid.spacing.min_element();
     for p in 0..volume.states.len() {
         let centre = volume.positions[p];
-        let Some((low, high)) = screen_box(camera, centre, radius, width, height) else { continue };
+        let Some(Disc { low, high, radius_px }) = disc(camera, centre, radius, width, height) else { continue };
+        let rim = RIM_SHARE.min(RIM_PX / radius_px);
         for y in low.1..high.1 {
             for x in low.0..high.0 {
                 let (origin, direction) = camera.pixel_ray(x, y, width, height);
@@ -37,7 +45,12 @@ pub fn draw(scene_picture: &Picture8, view: &View, camera: &Camera, volume: &Vol
                 if t < depth[pixel] {
                     depth[pixel] = t;
                     let normal = (origin + direction * t - centre) / radius;
-                    picture.pixels[pixel] = color(volume, p, normal, -direction, exposure_ev);
+                    // The sine of the angle to the viewer is the distance from the disc's centre, in radii.
+                    let from_centre = normal.cross(direction).length();
+                    picture.pixels[pixel] = match from_centre > 1.0 - rim {
+                        true => RIM_COLOR,
+                        false => color(volume, p, normal, -direction, exposure_ev),
+                    };
                 }
             }
         }
@@ -64,8 +77,17 @@ fn color(volume: &Volume, probe: usize, normal: Vec3, view: Vec3, exposure_ev: f
     }
 }
 
-/// Pixels that a sphere may cover; `None` behind the camera.
-fn screen_box(camera: &Camera, centre: Vec3, radius: f32, width: u32, height: u32) -> Option<((u32, u32), (u32, u32))> {
+/// Where a sphere lies in the picture.
+struct Disc {
+    /// Pixels that it may cover: up to, but not including, `high`.
+    low: (u32, u32),
+    high: (u32, u32),
+    /// About.
+    radius_px: f32,
+}
+
+/// Where a sphere lies in the picture; `None` behind the camera.
+fn disc(camera: &Camera, centre: Vec3, radius: f32, width: u32, height: u32) -> Option<Disc> {
     let in_camera = camera.world_from_camera.transpose() * (centre - camera.position);
     let scale = match camera.projection {
         Projection::Perspective { fov_y_rad } => {
@@ -86,7 +108,11 @@ fn screen_box(camera: &Camera, centre: Vec3, radius: f32, width: u32, height: u3
     let to_pixel = |ndc: Vec2| (Vec2::new(ndc.x, -ndc.y) * 0.5 + 0.5) * size;
     let a = to_pixel(middle + Vec2::new(-reach.x, reach.y)).max(Vec2::ZERO).floor();
     let b = to_pixel(middle + Vec2::new(reach.x, -reach.y)).min(size).ceil();
-    (a.x < b.x && a.y < b.y).then_some(((a.x as u32, a.y as u32), (b.x as u32, b.y as u32)))
+    (a.x < b.x && a.y < b.y).then_some(Disc {
+        low: (a.x as u32, a.y as u32),
+        high: (b.x as u32, b.y as u32),
+        radius_px: radius * scale * 0.5 * size.y,
+    })
 }
 
 /// Distance along the unit direction to the front of a sphere.

@@ -3,6 +3,7 @@
 //! share cannot hide.
 
 mod adversarial;
+mod care;
 mod closed_forms;
 mod command_line;
 #[path = "../common/mod.rs"]

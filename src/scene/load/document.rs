@@ -119,6 +119,15 @@ pub(super) fn short(name: &str) -> String {
     format!("{}{dots}", cut.escape_debug())
 }
 
+/// A message from a parser or decoder, on one line; a long one ends after a whole word.
+pub(super) fn sentence(message: &str) -> String {
+    const MAX_CHARS: usize = 240;
+    let line = message.split_whitespace().collect::<Vec<_>>().join(" ");
+    let Some((end, _)) = line.char_indices().nth(MAX_CHARS) else { return line.escape_debug().to_string() };
+    let kept = line[..end].rsplit_once(' ').map_or(&line[..end], |(kept, _)| kept);
+    format!("{} …", kept.escape_debug())
+}
+
 #[derive(serde::Deserialize)]
 struct SceneRoots {
     /// Absent in files of some exporters, although `gltf::json` requires it.
@@ -183,5 +192,5 @@ impl Sections<'_> {
 }
 
 fn one_line(error: &serde_json::Error) -> String {
-    short(&error.to_string()).replace("\\\"", "\"").replace("\\'", "'")
+    sentence(&error.to_string()).replace("\\\"", "\"").replace("\\'", "'")
 }

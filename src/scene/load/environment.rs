@@ -7,6 +7,7 @@ use glam::Vec3;
 use image::codecs::hdr::HdrDecoder;
 use image::{DynamicImage, ImageDecoder};
 
+use super::document::sentence;
 use super::inputs::Inputs;
 use crate::scene::environment::{Environment, EnvironmentMap};
 use crate::scene::error::SceneError;
@@ -54,37 +55,53 @@ pub(super) fn load(
 
 fn decode(path: &Path, bytes: &[u8]) -> Result<EnvironmentMap, SceneError> {
     let result = if bytes.starts_with(&EXR_MAGIC) { decode_exr(bytes) } else { decode_hdr(bytes) };
-    result.map_err(|what| SceneError::Image {
-        file: path.to_owned(),
-        place: "environment map".to_owned(),
-        what: super::document::short(&what),
-        remedy: "give an equirectangular .hdr or .exr of linear RGB",
+    let (file, place) = (path.to_owned(), "environment map".to_owned());
+    result.map_err(|failure| match failure {
+        Failure::Broken(what) => SceneError::Image {
+            file,
+            place,
+            what: sentence(&what),
+            remedy: "give an equirectangular .hdr or .exr of linear RGB",
+        },
+        Failure::TooLarge(what) => {
+            SceneError::TooLarge { file, place, what, remedy: "reduce the map; 8192×4096 is the most" }
+        }
     })
+}
+
+/// Why a map was not decoded.
+enum Failure {
+    Broken(String),
+    TooLarge(String),
 }
 
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
-fn check_size(width: u64, height: u64, bytes: &[u8]) -> Result<(), String> {
+fn check_size(width: u64, height: u64, bytes: &[u8]) -> Result<(), Failure> {
     let allowed = MAX_TEXELS.min(MAX_UNBACKED_TEXELS.max(MAX_RATIO * bytes.len() as u64));
     match width.checked_mul(height) {
-        Some(0) => Err("it has no pixels".to_owned()),
+        Some(0) => Err(Failure::Broken("it has no pixels".to_owned())),
         Some(texels) if texels <= allowed => Ok(()),
-        _ => Err(format!("{width}×{height} pixels are more than the {allowed} allowed for this file")),
+        _ => Err(Failure::TooLarge(format!(
+            "{width}×{height} pixels are more than the {allowed} that are read of a file of {} bytes",
+            bytes.len()
+        ))),
     }
 }
 
-fn decode_hdr(bytes: &[u8]) -> Result<EnvironmentMap, String> {
-    let decoder = HdrDecoder::new(Cursor::new(bytes)).map_err(|e| format!("neither HDR nor EXR: {e}"))?;
+fn decode_hdr(bytes: &[u8]) -> Result<EnvironmentMap, Failure> {
+    let broken = |what: &str, e: image::ImageError| Failure::Broken(format!("{what}: {e}"));
+    let decoder = HdrDecoder::new(Cursor::new(bytes)).map_err(|e| broken("neither HDR nor EXR", e))?;
     let (width, height) = decoder.dimensions();
     check_size(width.into(), height.into(), bytes)?;
-    let image = DynamicImage::from_decoder(decoder).map_err(|e| format!("it does not decode: {e}"))?;
+    let image = DynamicImage::from_decoder(decoder).map_err(|e| broken("it does not decode", e))?;
     let texels = image.into_rgb32f().pixels().map(|p| Vec3::from_array(p.0)).collect();
     Ok(EnvironmentMap { width: width as usize, height: height as usize, texels })
 }
 
-fn decode_exr(bytes: &[u8]) -> Result<EnvironmentMap, String> {
+fn decode_exr(bytes: &[u8]) -> Result<EnvironmentMap, Failure> {
     use exr::prelude::{MetaData, ReadChannels, ReadLayers, read};
-    let describe = |e: exr::error::Error| format!("it does not decode: {e}");
+    let describe = |e: exr::error::Error| Failure::Broken(format!("it does not decode: {e}"));
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(describe)?;
     for header in &meta.headers {
         check_size(header.layer_size.0 as u64, header.layer_size.1 as u64, bytes)?;

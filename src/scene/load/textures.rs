@@ -8,7 +8,7 @@ use gltf::json::validation::Checked;
 use gltf::json::{Image, Index, Texture as Definition};
 
 use super::buffers::Buffers;
-use super::document::{Document, label};
+use super::document::{Document, label, sentence};
 use super::extensions::{COMPRESSED_IMAGES, remedy};
 use super::image::{Budget, Decoded, Failure};
 use super::inputs::{Inputs, Resource, resolve};
@@ -168,7 +168,7 @@ impl<'a> Textures<'a> {
         let file = document.file.clone();
         self.budget.decode(bytes, srgb).map_err(|failure| match failure {
             Failure::Extension(extension) => self.unsupported(&place, extension),
-            Failure::Broken(what) => SceneError::Image { file, place, what, remedy: REMEDY },
+            Failure::Broken(what) => SceneError::Image { file, place, what: sentence(&what), remedy: REMEDY },
             Failure::TooLarge(what) => SceneError::TooLarge { file, place, what, remedy: "give smaller images" },
         })
     }

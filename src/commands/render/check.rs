@@ -1,0 +1,71 @@
+//! What can be said before a picture is made: that it cannot be written, will not fit, or shows nothing.
+
+use std::path::Path;
+
+use anyhow::Result;
+
+use crate::cli::{RenderArgs, Size};
+use crate::commands::Console;
+use crate::light::World;
+use crate::memory::{TooLittleMemory, available_bytes};
+use crate::output::{Named, check_folder, check_outputs};
+use crate::scene::Camera;
+use crate::shade::outlook::Outlook;
+
+/// Memory that a render takes at its peak, per pixel and per point in the picture: the slope of peak memory over the
+/// number of pixels, which is 579 B where there is only sky and 758 B where each pixel shows one point, rounded up.
+const PIXEL_BYTES: f64 = 600.0;
+const POINT_BYTES: f64 = 200.0;
+/// Points beyond the first of a pixel stand in lists that grow by doubling.
+const FURTHER_POINT_BYTES: f64 = 700.0;
+
+/// Files that a camera's folder gets.
+pub const PICTURES: &[&str] = &[
+    "visibility_off.exr",
+    "visibility_off.png",
+    "visibility_on.exr",
+    "visibility_on.png",
+    "visibility_ray.exr",
+    "visibility_ray.png",
+    "leak.exr",
+    "leak.png",
+    "probes.png",
+    "report.json",
+];
+
+pub fn pictures(folder: &Path) -> Vec<Named> {
+    PICTURES.iter().map(|name| Named::new("-o", folder.join(name))).collect()
+}
+
+/// Refuses a folder in which not all pictures can be written, before any is made.
+pub fn check_pictures(folder: &Path, inputs: &[Named]) -> Result<()> {
+    check_folder(folder)?;
+    // In a folder that is not there nothing is in the way.
+    if folder.is_dir() {
+        check_outputs(&pictures(folder), inputs)?;
+    }
+    Ok(())
+}
+
+/// Warns of cameras that show nothing of use, and refuses pictures that do not fit into memory.
+pub fn check_view(args: &RenderArgs, world: &World, camera: &Camera, console: &Console) -> Result<()> {
+    let Size { width, height } = args.size;
+    let outlook = Outlook::new(world, camera, width, height, args.trace.seed);
+    if let Some(warning) = outlook.warning() {
+        console.warn(format!("camera {}: {warning}", camera.name));
+    }
+    let pixels = f64::from(width) * f64::from(height);
+    let points = f64::from(outlook.points_per_pixel);
+    let of_points = points.min(1.0) * POINT_BYTES + (points - 1.0).max(0.0) * FURTHER_POINT_BYTES;
+    let needed = (pixels * (PIXEL_BYTES + of_points)) as u64;
+    match available_bytes() {
+        Some(available) if needed > available => Err(TooLittleMemory {
+            key: format!("--size {width}x{height}"),
+            what: "the pictures",
+            needed,
+            available,
+            remedy: "choose a smaller size",
+        })?,
+        _ => Ok(()),
+    }
+}

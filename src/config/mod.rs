@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
-use crate::probe::capture::CaptureSettings;
+use crate::probe::capture::{CaptureSettings, ReflectedLight};
 use crate::probe::encode::EncodingSettings;
 use crate::probe::filter::FilterSettings;
 use crate::probe::grid::GridSettings;
@@ -124,6 +124,14 @@ impl Config {
         rule("capture.samples_per_texel", samples.to_string(), (1..=65_536).contains(&samples), "use 1 to 65536");
         let emitter = c.emitter_samples;
         rule("capture.emitter_samples", emitter.to_string(), (1..=65_536).contains(&emitter), "use 1 to 65536");
+        if let ReflectedLight::PathTraced { paths } = c.reflected {
+            rule(
+                "capture.reflected.path_traced.paths",
+                paths.to_string(),
+                (1..=1 << 20).contains(&paths),
+                "use 1 to 1048576",
+            );
+        }
         let probe = c.probe_emitter_samples;
         rule("capture.probe_emitter_samples", probe.to_string(), probe <= 1 << 20, "use 0 to 1048576");
         rule(

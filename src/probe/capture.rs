@@ -4,14 +4,16 @@
 //! [`Surfel`] — enough to compute its outgoing radiance again and again as bounces are added — and of every texel the
 //! emitted radiance and the distance. Traced once; a bounce costs queries only.
 
-use glam::{UVec2, Vec2, Vec3, Vec3A};
+use glam::{DVec3, UVec2, Vec2, Vec3, Vec3A};
 use serde::{Deserialize, Serialize};
 
 use super::surface_visibility::Facing;
 use crate::light::World;
 use crate::light::lambert::reflected_radiance;
+use crate::light::path::PathSettings;
 use crate::light::sampled::{Allocation, RayCount};
 use crate::light::surface::SurfacePoint;
+use crate::math::blocks::{BLOCK, Block};
 use crate::math::octahedral::{direction_and_density, oct_from_direction, solid_angle_density};
 use crate::math::random::{Purpose, Random, Spread};
 use crate::math::statistics::Moments;
@@ -27,6 +29,19 @@ pub enum EmissionTransport {
     Gathered,
 }
 
+/// How light that surfaces have reflected reaches the surfaces that probes see.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum ReflectedLight {
+    /// The probes' own irradiance is asked at every hit, bounce after bounce.
+    ThroughProbes,
+    /// Paths are traced from every hit until they end: the truth at the probes, up to resolution and noise.
+    PathTraced {
+        /// At every hit; whole blocks of [`BLOCK`].
+        paths: u32,
+    },
+}
+
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CaptureSettings {
@@ -34,6 +49,7 @@ pub struct CaptureSettings {
     pub resolution: usize,
     /// Stratified rays per texel.
     pub samples_per_texel: usize,
+    pub reflected: ReflectedLight,
     pub emission: EmissionTransport,
     /// Emitter samples at every hit (with `emission: sampled`).
     pub emitter_samples: u32,
@@ -46,6 +62,7 @@ impl Default for CaptureSettings {
         CaptureSettings {
             resolution: 32,
             samples_per_texel: 1,
+            reflected: ReflectedLight::ThroughProbes,
             emission: EmissionTransport::Sampled,
             emitter_samples: 4,
             probe_emitter_samples: 64,
@@ -203,7 +220,10 @@ impl Capture<'_, '_> {
                 }
             }
             for (ray, surface) in &lit {
-                self.light(ray, surface, allocation, &mut random, &mut out);
+                match self.settings.reflected {
+                    ReflectedLight::ThroughProbes => self.light(ray, surface, allocation, &mut random, &mut out),
+                    ReflectedLight::PathTraced { paths } => self.light_by_paths(index, ray, surface, paths, &mut out),
+                }
             }
         }
         out.rays.primary += (self.texels() * samples) as u64;
@@ -279,6 +299,34 @@ impl Capture<'_, '_> {
             direct = Vec3::ZERO;
         }
         out.surfels.push(Surfel::new(surface, direct, ray.texel, ray.share));
+    }
+
+    /// Lights a hit with all light there is and keeps it, as a surface that reflects none of the probes' light.
+    fn light_by_paths(&self, probe: usize, ray: &TexelRay, surface: &SurfacePoint, paths: u32, out: &mut ProbeCapture) {
+        let world = self.world;
+        let normal = surface.shading_normal;
+        let (settings, blocks) = (PathSettings::default(), paths.div_ceil(BLOCK));
+        let mut sum = DVec3::ZERO;
+        let mut salt = 0;
+        for block in 0..blocks {
+            let hit = out.surfels.len() as u64;
+            let block = Block::new(self.seed, Purpose::ProbePaths, probe as u64, hit << 32 | u64::from(block));
+            for i in 0..BLOCK {
+                let mut numbers = block.sample(i);
+                salt = numbers.salt();
+                let gathered = world.gather(surface, normal, -ray.direction, &settings, &mut numbers, &mut out.rays);
+                if gathered.irradiance.is_finite() {
+                    sum += gathered.irradiance.as_dvec3();
+                } else {
+                    out.non_finite += 1;
+                }
+            }
+        }
+        let (punctual, shadow_rays) = world.punctual_irradiance(surface, normal, salt);
+        out.rays.shadow += u64::from(shadow_rays);
+        let irradiance = punctual + (sum / f64::from((blocks * BLOCK).max(1))).as_vec3();
+        let radiance = reflected_radiance(surface.albedo, irradiance);
+        out.surfels.push(Surfel::new(&SurfacePoint { albedo: Vec3::ZERO, ..*surface }, radiance, ray.texel, ray.share));
     }
 
     /// Draws emitters from the probe's centre.

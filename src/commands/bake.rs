@@ -17,6 +17,7 @@ use crate::probe::file::SceneRecord;
 use crate::probe::layout;
 use crate::report::bake::{BakeReport, BytesPerProbe, SCHEMA};
 use crate::report::format;
+use crate::report::header::Header;
 use crate::report::table::{Column, Table};
 use crate::scene::{EnvironmentSource, Scene};
 
@@ -168,13 +169,7 @@ fn report(
         probes,
     );
     BakeReport {
-        schema: SCHEMA,
-        version: env!("CARGO_PKG_VERSION"),
-        command: "bake",
-        seed,
-        threads,
-        scene_blake3: scene.blake3.clone(),
-        config: config.to_ron(),
+        header: Header::new(SCHEMA, "bake", seed, threads, &scene.blake3, config.to_ron()),
         probes,
         probes_active: baked.volume.active_count(),
         rays: baked.rays,

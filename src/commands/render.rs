@@ -18,6 +18,7 @@ use crate::probe::query::{Query, VisibilitySettings};
 use crate::probe::{Volume, layout};
 use crate::report::colormap::Scale;
 use crate::report::format;
+use crate::report::header::Header;
 use crate::report::heatmap::{Heatmap, range_of};
 use crate::report::leak;
 use crate::report::render::{MethodReport, RenderReport, RenderTimes, SCHEMA, Spread};
@@ -217,13 +218,14 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
     create_folder(folder)?;
     write_pictures(run, camera, &view, &shaded, exposure_ev, folder)?;
     let report = RenderReport {
-        schema: SCHEMA,
-        version: env!("CARGO_PKG_VERSION"),
-        command: "render",
-        seed: args.trace.seed,
-        threads: run.threads,
-        scene_blake3: run.world.scene.blake3.clone(),
-        config: run.config.to_ron(),
+        header: Header::new(
+            SCHEMA,
+            "render",
+            args.trace.seed,
+            run.threads,
+            &run.world.scene.blake3,
+            run.config.to_ron(),
+        ),
         scene_changed: run.scene_changed,
         camera: camera.name.clone(),
         width: view.width,

@@ -5,6 +5,7 @@ pub mod canvas;
 pub mod colormap;
 pub mod font;
 pub mod format;
+pub mod header;
 pub mod heatmap;
 pub mod leak;
 pub mod legend;

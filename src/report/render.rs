@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::header::Header;
 use super::leak::Leak;
 
 /// Version of the report's layout.
@@ -9,14 +10,9 @@ pub const SCHEMA: &str = "lightprobe-render/1";
 
 #[derive(Debug, Clone, Serialize)]
 pub struct RenderReport {
-    pub schema: &'static str,
-    pub version: &'static str,
-    pub command: &'static str,
-    pub seed: u64,
-    pub threads: usize,
-    pub scene_blake3: String,
-    /// Configuration of the bake, RON.
-    pub config: String,
+    /// Its configuration is that of the bake.
+    #[serde(flatten)]
+    pub header: Header,
     /// Whether the probes were baked from other bytes than the scene now has (`--allow-scene-change`).
     pub scene_changed: bool,
     pub camera: String,

@@ -15,6 +15,8 @@ pub enum Purpose {
     Pixel = 3,
     /// Points on surfaces from which visibility is measured.
     SurfaceVisibility = 4,
+    /// Noise that is added to a reference, to see what its own noise does to FLIP.
+    FlipReplicate = 16,
 }
 
 /// One stream, named by seed, purpose and up to two indices (probe and texel, pixel and sample, …).

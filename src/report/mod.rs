@@ -3,12 +3,14 @@
 pub mod bake;
 pub mod canvas;
 pub mod colormap;
+pub mod error;
 pub mod font;
 pub mod format;
 pub mod header;
 pub mod heatmap;
 pub mod leak;
 pub mod legend;
+pub mod reference;
 pub mod render;
 pub mod table;
 pub mod text;

@@ -4,4 +4,5 @@ pub mod framing;
 pub mod layers;
 pub mod methods;
 pub mod points;
+pub mod regions;
 pub mod spheres;

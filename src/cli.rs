@@ -121,6 +121,9 @@ pub struct RenderArgs {
     /// Exposure of the PNG pictures, in powers of two; from the picture where not given.
     #[arg(long, value_name = "EV", allow_hyphen_values = true, value_parser = parse_exposure)]
     pub exposure: Option<f32>,
+    /// Compare with this picture of the same camera and size, which `reference` wrote, and report errors.
+    #[arg(long, value_name = "FILE.exr")]
+    pub reference_image: Option<PathBuf>,
     /// Render although the scene has changed since the bake.
     #[arg(long)]
     pub allow_scene_change: bool,

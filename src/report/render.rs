@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::error::ErrorReport;
 use super::header::Header;
 use super::leak::Leak;
 
@@ -26,7 +27,23 @@ pub struct RenderReport {
     pub probes_active: usize,
     pub time_s: RenderTimes,
     pub peak_memory_bytes: u64,
+    /// What the methods' `error` compares with.
+    pub reference: Option<ReferenceReport>,
     pub methods: Vec<MethodReport>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct ReferenceReport {
+    /// As it was given; `null` where the reference was traced.
+    pub file: Option<String>,
+    /// Samples per pixel; `null` where a file does not say.
+    pub spp: Option<u32>,
+    /// Spent on tracing it, in the run that did.
+    pub time_s: Option<f64>,
+    /// Mean over the pixels that show a surface, luminance, W·m⁻².
+    pub irradiance_indirect_mean: Option<f64>,
+    /// Mean over these pixels of the standard error of that luminance, W·m⁻²; `null` where the noise is not known.
+    pub standard_error_mean: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, Default, Serialize)]
@@ -53,6 +70,8 @@ pub struct MethodReport {
     /// Mean over image points, luminance, W·m⁻².
     pub irradiance_indirect_mean: Option<f64>,
     pub leak: Leak,
+    /// `null` without a reference.
+    pub error: Option<ErrorReport>,
 }
 
 #[derive(Debug, Clone, Copy, Serialize)]

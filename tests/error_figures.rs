@@ -12,7 +12,7 @@ use lightprobe::math::random::{Purpose, Random};
 use lightprobe::report::error::flip::{Flip, measure as measure_flip};
 use lightprobe::report::error::{ErrorReport, Figures, measure};
 use lightprobe::report::leak::dark_region;
-use lightprobe::report::reference::{ReferenceError, ReferenceLayers};
+use lightprobe::report::reference_layers::{ReferenceError, ReferenceLayers};
 use lightprobe::scene::{self, Camera, LoadOptions};
 use lightprobe::shade::points::see;
 use lightprobe::shade::regions::{Region, regions};

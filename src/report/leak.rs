@@ -7,7 +7,7 @@
 use glam::Vec3;
 use serde::Serialize;
 
-use super::reference::ReferenceLayers;
+use super::reference_layers::ReferenceLayers;
 use crate::math::color::luminance;
 use crate::probe::query::Query;
 use crate::shade::methods::Method;

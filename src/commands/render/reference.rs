@@ -10,7 +10,7 @@ use super::Run;
 use crate::cli::RenderArgs;
 use crate::image::LayeredImage;
 use crate::output::write_atomically;
-use crate::report::reference::ReferenceLayers;
+use crate::report::reference_layers::ReferenceLayers;
 use crate::report::render::ReferenceReport;
 use crate::shade::points::View;
 use crate::shade::regions::{Region, regions};

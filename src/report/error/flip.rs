@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use super::window::window_means;
 use crate::image::{Picture, Picture8};
 use crate::math::random::{Purpose, Random};
-use crate::report::reference::ReferenceLayers;
+use crate::report::reference_layers::ReferenceLayers;
 use crate::shade::regions::Region;
 
 /// Replicates of the reference: their spread is known to a quarter.

@@ -24,7 +24,7 @@ mod window;
 use glam::Vec3;
 use serde::Serialize;
 
-use super::reference::ReferenceLayers;
+use super::reference_layers::ReferenceLayers;
 use crate::shade::regions::Region;
 use pooled::{Pooled, Terms};
 use terms::{FOLD_UNCERTAINTY, fold, relative_square};

@@ -1,6 +1,6 @@
 //! A figure as a mean over pixels and channels, and what the reference's noise does to it.
 
-use crate::report::reference::Noise;
+use crate::report::reference_layers::Noise;
 
 /// Pixels × channels of a figure f(r), r being the reference with its noise: Σf, and the variance of that sum.
 ///

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 
-use super::{Console, load_scene, peak_memory_bytes, set_threads, write_json};
+use super::{Console, load_scene, peak_memory_bytes, resolve_config, set_threads, write_json};
 use crate::bake::{Baked, Checkpoint, Circumstances, Prepared, prepare};
 use crate::cli::BakeArgs;
 use crate::config::{Config, presets};
@@ -19,13 +19,13 @@ use crate::report::bake::{BakeReport, BytesPerProbe, SCHEMA};
 use crate::report::format;
 use crate::report::header::Header;
 use crate::report::table::{Column, Table};
-use crate::scene::{EnvironmentSource, Scene};
+use crate::scene::Scene;
 
 pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
-    if args.preset.as_deref() == Some("list") {
+    if args.config.preset.as_deref() == Some("list") {
         return list_presets(console);
     }
-    let config = resolve_config(args)?;
+    let config = resolve_config(&args.config, &args.trace)?;
     if args.print_config {
         return console.print(&config.to_ron());
     }
@@ -95,23 +95,6 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
 fn list_presets(console: &Console) -> Result<()> {
     let lines: Vec<String> = presets::PRESETS.iter().map(|p| format!("{:<20} {}", p.name, p.summary)).collect();
     console.print(&lines.join("\n"))
-}
-
-/// Defaults, then preset or file, then `--set`, then a constant `--env`, which the probe file so carries to `render`.
-fn resolve_config(args: &BakeArgs) -> Result<Config> {
-    let mut config = match (&args.config, &args.preset) {
-        (Some(path), _) => Config::load(path)?,
-        (None, Some(name)) => presets::find(name)?,
-        (None, None) => Config::default(),
-    };
-    config = config.with_overrides(&args.set)?;
-    match &args.trace.env {
-        Some(EnvironmentSource::Constant(sky)) => config.lights.sky = Some((*sky).into()),
-        // A map replaces the configured sky; its path has no place in the file.
-        Some(EnvironmentSource::File(_)) => config.lights.sky = None,
-        None => {}
-    }
-    Ok(config)
 }
 
 fn dry_run(prepared: &Prepared, circumstances: &Circumstances, console: &Console) -> Result<()> {

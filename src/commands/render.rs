@@ -7,12 +7,13 @@ mod table;
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
-use glam::{DVec3, Vec3};
+use anyhow::{Result, bail};
+use glam::Vec3;
 
 use self::reference::{Reference, ReferenceFile};
+use super::camera::cameras;
 use super::{Console, load_scene, peak_memory_bytes, set_threads, write_json};
-use crate::cli::{LookAt, RenderArgs};
+use crate::cli::RenderArgs;
 use crate::config::Config;
 use crate::image::LayeredImage;
 use crate::light::World;
@@ -25,7 +26,6 @@ use crate::report::header::Header;
 use crate::report::render::{MethodReport, RenderReport, RenderTimes, SCHEMA, Spread};
 use crate::report::{error, leak};
 use crate::scene::{Camera, Scene};
-use crate::shade::framing::frame;
 use crate::shade::layers::compose;
 use crate::shade::methods::{Method, exact_masks, irradiance, time_lookup, time_shading};
 use crate::shade::points::{View, see};
@@ -69,7 +69,7 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
 
     let volume = volume_as_planned(&probes, &scene);
     let bytes_per_probe = runtime_bytes(&probes, &config);
-    let cameras = cameras(args, &world, console)?;
+    let cameras = cameras(&args.view, &world, console)?;
     if reference_file.is_some() && cameras.len() > 1 {
         bail!("--reference-image is of one camera and --camera all asks for {}; name one", cameras.len());
     }
@@ -88,7 +88,7 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
     };
     let mut reports = Vec::new();
     for camera in &cameras {
-        let folder = if args.camera.as_deref() == Some("all") {
+        let folder = if args.view.camera.as_deref() == Some("all") {
             args.output.join(folder_name(&camera.name))
         } else {
             args.output.clone()
@@ -148,40 +148,6 @@ fn runtime_bytes(probes: &ProbeFile, config: &Config) -> f64 {
         + layout::visibility_bytes(visibility, &config.filter, &config.encoding, surface, count)
 }
 
-/// The cameras that the arguments ask for.
-fn cameras(args: &RenderArgs, world: &World, console: &Console) -> Result<Vec<Camera>> {
-    let scene = world.scene;
-    if let Some(LookAt { origin, target, fov_y_deg }) = args.look_at {
-        let local = |p: [f64; 3]| (DVec3::from(p) - scene.origin_world).as_vec3();
-        return Ok(vec![Camera::look_at("look-at", local(origin), local(target), fov_y_deg.to_radians())]);
-    }
-    let known = || scene.cameras.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ");
-    match args.camera.as_deref() {
-        Some(name) if !scene.cameras.is_empty() || (name != "all" && name != "0") => {
-            if name == "all" {
-                return Ok(scene.cameras.clone());
-            }
-            let by_index = || name.parse::<usize>().ok().and_then(|i| scene.cameras.get(i));
-            let camera = scene.cameras.iter().find(|c| c.name == name).or_else(by_index);
-            let camera = camera.with_context(|| match scene.cameras.len() {
-                0 => format!("--camera {name}: the scene has no cameras; leave it out or use --look-at"),
-                n => format!("--camera {name}: the scene has the cameras {} (numbers 0 to {})", known(), n - 1),
-            })?;
-            Ok(vec![camera.clone()])
-        }
-        _ => Ok(vec![match scene.cameras.first() {
-            Some(camera) => camera.clone(),
-            None => {
-                let bounds = scene.mesh.bounds().unwrap_or((Vec3::NEG_ONE, Vec3::ONE));
-                let (camera, inside) = frame(world, bounds);
-                let from = if inside { "from inside" } else { "from outside" };
-                console.warn(format!("the scene has no camera: framed it {from}; use --look-at for another view"));
-                camera
-            }
-        }]),
-    }
-}
-
 /// A camera's name as the name of a folder.
 fn folder_name(camera: &str) -> String {
     let safe = |c: char| if c.is_alphanumeric() || matches!(c, '-' | '_' | '#' | ' ') { c } else { '_' };
@@ -193,7 +159,7 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
     let query = Query { volume, settings: &run.config.query };
     let bar = run.console.progress.stage("rendering", 2 + Method::ALL.len());
     let primary_started = Instant::now();
-    let view = see(run.world, camera, args.size.width, args.size.height, args.trace.seed);
+    let view = see(run.world, camera, args.view.size.width, args.view.size.height, args.trace.seed);
     let primary_s = primary_started.elapsed().as_secs_f64();
     bar.inc(1);
     let masks_started = Instant::now();

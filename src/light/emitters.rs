@@ -10,7 +10,7 @@ use glam::{Vec2, Vec3};
 
 use crate::math::alias::AliasTable;
 use crate::math::color::luminance;
-use crate::math::random::Random;
+use crate::math::random::Numbers;
 use crate::math::sampling::{UNIFORM_SPHERE_DENSITY, triangle_barycentric, uniform_sphere};
 use crate::scene::environment::EnvironmentMap;
 use crate::scene::{Environment, Scene, TriangleIndex};
@@ -156,7 +156,7 @@ impl Emitters {
 
     /// A direction from `point` towards an emitter; `None` where the chosen one cannot light it.
     #[inline]
-    pub fn sample(&self, scene: &Scene, point: Vec3, random: &mut Random) -> Option<LightSample> {
+    pub fn sample(&self, scene: &Scene, point: Vec3, random: &mut impl Numbers) -> Option<LightSample> {
         let sky_share = self.sky_share();
         // No number is drawn where there is no choice.
         if sky_share == 1.0 || (sky_share > 0.0 && random.uniform() < sky_share) {
@@ -165,7 +165,7 @@ impl Emitters {
             return Some(LightSample { direction, target: None, radiance, density: density * sky_share });
         }
         let triangle = &self.triangles[self.alias.as_ref()?.draw(random)];
-        let barycentric = triangle_barycentric(Vec2::new(random.uniform(), random.uniform()));
+        let barycentric = triangle_barycentric(random.pair());
         let target = triangle.point(barycentric);
         let to_target = target - point;
         let distance_squared = to_target.length_squared();
@@ -221,18 +221,19 @@ impl Sky {
         }
     }
 
-    fn sample(&self, environment: &Environment, random: &mut Random) -> (Vec3, f32) {
+    fn sample(&self, environment: &Environment, random: &mut impl Numbers) -> (Vec3, f32) {
         match (self, environment) {
             (Sky::Map { alias, density }, Environment::Map(map)) => {
                 let texel = alias.draw(random);
                 let (x, y) = ((texel % map.width) as f32, (texel / map.width) as f32);
+                let within = random.pair();
                 // Uniform in solid angle within the texel: uniform in the cosine of the polar angle.
                 let cos_of = |row: f32| (row / map.height as f32 * PI).cos();
-                let cosine = cos_of(y) + (cos_of(y + 1.0) - cos_of(y)) * random.uniform();
-                let u = (x + random.uniform()) / map.width as f32;
+                let cosine = cos_of(y) + (cos_of(y + 1.0) - cos_of(y)) * within.x;
+                let u = (x + within.y) / map.width as f32;
                 (EnvironmentMap::direction(Vec2::new(u, cosine.clamp(-1.0, 1.0).acos() / PI)), density[texel])
             }
-            _ => (uniform_sphere(Vec2::new(random.uniform(), random.uniform())), UNIFORM_SPHERE_DENSITY),
+            _ => (uniform_sphere(random.pair()), UNIFORM_SPHERE_DENSITY),
         }
     }
 

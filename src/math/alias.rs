@@ -3,7 +3,7 @@
 //! Source: Vose, *A Linear Algorithm for Generating Random Numbers with a Given Distribution*, 1991. The capture draws
 //! one emitter per shadow ray, so a draw must cost little against a ray: one 64-bit word and one entry of 8 bytes.
 
-use super::random::Random;
+use super::random::Numbers;
 
 /// A discrete distribution.
 #[derive(Debug, Clone)]
@@ -51,7 +51,7 @@ impl AliasTable {
 
     /// An index with the probability of its weight. A table of one takes no random number.
     #[inline]
-    pub fn draw(&self, random: &mut Random) -> usize {
+    pub fn draw(&self, random: &mut impl Numbers) -> usize {
         if self.entries.len() == 1 {
             return 0;
         }
@@ -65,7 +65,7 @@ impl AliasTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::random::Purpose;
+    use crate::math::random::{Purpose, Random};
 
     #[test]
     fn indices_come_as_often_as_their_weights_say() {

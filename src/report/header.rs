@@ -1,19 +1,19 @@
-//! What every report starts with.
+//! What every report begins with.
 
 use serde::Serialize;
 
-/// The first keys of every report: what was run, on what, with what. Reports flatten it.
 #[derive(Debug, Clone, Serialize)]
 pub struct Header {
-    /// Layout of the report and its version, such as "lightprobe-bake/1".
+    /// Name and version of the report's layout.
     pub schema: &'static str,
     /// Of the program.
     pub version: &'static str,
     pub command: &'static str,
     pub seed: u64,
     pub threads: usize,
+    /// Of every byte of the scene's files and of its sky.
     pub scene_blake3: String,
-    /// Effective configuration, RON; in reports on probes that of their bake.
+    /// Effective configuration, RON.
     pub config: String,
 }
 

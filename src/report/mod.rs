@@ -10,6 +10,7 @@ pub mod header;
 pub mod heatmap;
 pub mod leak;
 pub mod legend;
+pub mod reference;
 pub mod reference_layers;
 pub mod render;
 pub mod table;

@@ -1,8 +1,11 @@
 //! Cameras to pictures: what is seen, how probes light it, and the layers that come of it.
 
+pub mod film;
 pub mod framing;
 pub mod layers;
 pub mod methods;
 pub mod points;
+pub mod reference;
+pub mod reference_file;
 pub mod regions;
 pub mod spheres;

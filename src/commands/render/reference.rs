@@ -26,7 +26,7 @@ impl ReferenceFile {
     pub fn read(args: &RenderArgs) -> Result<Option<ReferenceFile>> {
         let Some(path) = &args.reference_image else { return Ok(None) };
         let image = LayeredImage::read_exr(path)?;
-        let size = (args.size.width, args.size.height);
+        let size = (args.view.size.width, args.view.size.height);
         let layers = ReferenceLayers::new(&image, size, None)
             .with_context(|| format!("--reference-image: cannot compare with {}", path.display()))?;
         Ok(Some(ReferenceFile { path: path.clone(), layers }))

@@ -10,7 +10,7 @@ use std::time::Instant;
 use anyhow::{Result, bail};
 use glam::Vec3;
 
-use self::reference::{Reference, ReferenceFile};
+use self::reference::{Reference, Source};
 use super::camera::cameras;
 use super::{Console, load_scene, peak_memory_bytes, set_threads, write_json};
 use crate::cli::RenderArgs;
@@ -39,7 +39,7 @@ struct Run<'a> {
     volume: &'a Volume,
     bytes_per_probe: f64,
     scene_changed: bool,
-    reference_file: Option<ReferenceFile>,
+    reference: Option<Source>,
     threads: usize,
     times: RenderTimes,
     started: Instant,
@@ -56,7 +56,7 @@ struct Shaded {
 pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
     let started = Instant::now();
     let threads = set_threads(args.trace.threads)?;
-    let reference_file = ReferenceFile::read(args)?;
+    let reference = Source::of(args)?;
     let probes = file::read(&args.probes)?;
     let config = Config::parse(&probes.config, &format!("{}: its configuration", args.probes.display()))?;
     let scene = load_scene(&args.scene, &args.trace, &config, console)?;
@@ -70,7 +70,7 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
     let volume = volume_as_planned(&probes, &scene);
     let bytes_per_probe = runtime_bytes(&probes, &config);
     let cameras = cameras(&args.view, &world, console)?;
-    if reference_file.is_some() && cameras.len() > 1 {
+    if args.reference_image.is_some() && cameras.len() > 1 {
         bail!("--reference-image is of one camera and --camera all asks for {}; name one", cameras.len());
     }
     let run = Run {
@@ -81,7 +81,7 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
         volume: &volume,
         bytes_per_probe,
         scene_changed,
-        reference_file,
+        reference,
         threads,
         times,
         started,
@@ -180,13 +180,14 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
             irradiance_indirect_mean: mean_luminance(&view, &irradiance),
             leak: leak::measure(&query, &view.points, &masks, method, &irradiance, &exact),
             error: None,
+            error_gltf: None,
         };
         bar.inc(1);
         Shaded { method, image: compose(&view, &irradiance), irradiance, report }
     };
     let mut shaded = Method::ALL.map(shade);
     bar.finish_and_clear();
-    let reference = Reference::obtain(run, &view);
+    let reference = Reference::obtain(run, camera, &view)?;
 
     let exposure_ev = args.exposure.unwrap_or_else(|| exposure(&shaded[2], reference.as_ref()));
     if let Some(reference) = &reference {
@@ -218,7 +219,7 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
         probes_active: volume.active_count(),
         time_s: RenderTimes { primary: primary_s, total: run.started.elapsed().as_secs_f64(), ..run.times },
         peak_memory_bytes: peak_memory_bytes(),
-        reference: reference.map(|r| r.report),
+        reference: reference.map(|r| r.summary),
         methods: shaded.into_iter().map(|s| s.report).collect(),
     };
     write_json(&folder.join("report.json"), &report)?;
@@ -243,7 +244,12 @@ fn compare(shaded: &mut Shaded, reference: &Reference, exposure_ev: f32, seed: u
     let Reference { layers, regions, .. } = reference;
     let irradiance = shaded.image.layer("irradiance_indirect").unwrap_or_default();
     let flips = shaded.image.picture("beauty").map(|p| error::flip::measure(layers, &p, exposure_ev, regions, seed));
-    shaded.report.error = Some(error::measure(layers, irradiance, regions, flips.as_ref()));
+    let error = Some(error::measure(layers, irradiance, regions, flips.as_ref()));
+    if reference.glossy {
+        shaded.report.error_gltf = error;
+    } else {
+        shaded.report.error = error;
+    }
     let shown: Vec<bool> = regions.iter().map(Option::is_some).collect();
     shaded.report.leak.dark_region = leak::dark_region(irradiance, layers, &shown);
 }

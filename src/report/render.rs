@@ -28,12 +28,12 @@ pub struct RenderReport {
     pub time_s: RenderTimes,
     pub peak_memory_bytes: u64,
     /// What the methods' `error` compares with.
-    pub reference: Option<ReferenceReport>,
+    pub reference: Option<ReferenceSummary>,
     pub methods: Vec<MethodReport>,
 }
 
-#[derive(Debug, Clone, Serialize)]
-pub struct ReferenceReport {
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct ReferenceSummary {
     /// As it was given; `null` where the reference was traced.
     pub file: Option<String>,
     /// Samples per pixel; `null` where a file does not say.
@@ -70,8 +70,11 @@ pub struct MethodReport {
     /// Mean over image points, luminance, W·m⁻².
     pub irradiance_indirect_mean: Option<f64>,
     pub leak: Leak,
-    /// `null` without a reference.
+    /// Against a reference of diffuse transport, as probes have it; `null` without one.
     pub error: Option<ErrorReport>,
+    /// Against a reference with glossy transport, which probes do not have; absent without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_gltf: Option<ErrorReport>,
 }
 
 #[derive(Debug, Clone, Copy, Serialize)]

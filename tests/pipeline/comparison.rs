@@ -165,3 +165,65 @@ fn a_reference_in_the_folder_of_the_run_stays_as_it_is() {
     assert_eq!(std::fs::read(&path).unwrap(), before);
     assert!(names_in(&rooms.folder.path().join("plain")).contains(&"reference.png".to_owned()));
 }
+
+#[test]
+fn a_traced_reference_is_as_good_as_its_file() {
+    let rooms = Rooms::new();
+    let run = |name: &str, words: &str| {
+        let words = format!("--size 32x18 {words}");
+        render(&rooms.folder, &scene("two_rooms_open"), &rooms.baked.path, name, &words)
+    };
+    let traced = run("traced", "--reference 50 --threads 1");
+    // Rounded up to whole blocks of 16.
+    assert_eq!((&traced["reference"]["spp"], &traced["reference"]["file"]), (&json!(64), &Value::Null));
+    assert!(number(&traced["reference"]["time_s"]) > 0.0);
+    let file = rooms.folder.path().join("traced/reference.exr");
+    let read = run("read", &format!("--reference-image {} --threads 2", text(&file)));
+    assert_eq!(read["reference"]["spp"], 64);
+    assert!(read["reference"]["time_s"].is_null());
+    for (a, b) in traced["methods"].as_array().unwrap().iter().zip(read["methods"].as_array().unwrap()) {
+        assert_eq!(a["error"], b["error"]);
+        assert_eq!(a["leak"], b["leak"]);
+        assert!(a.get("error_gltf").is_none());
+        // Interpolation errs by percents, and not by more than the light that there is.
+        let mean = number(&traced["reference"]["irradiance_indirect_mean"]);
+        assert!((0.01..1.0).contains(&(number(&a["error"]["rmse"]) / mean)), "{}", a["error"]);
+    }
+    // The other camera of the same scene, and other light.
+    let (rooms_scene, output) = (scene("two_rooms_open"), rooms.folder.path().join("refused"));
+    let start = ["render", text(&rooms_scene), text(&rooms.baked.path), "-o", text(&output), "--size", "32x18"];
+    let message = refuse(&[&start[..], &["--reference-image", text(&file), "--camera", "dark"]].concat());
+    assert!(message.contains("reference.exr") && message.contains("camera"), "{message}");
+    let changed = ["--reference-image", text(&file), "--env", "1,1,1", "--allow-scene-change"];
+    let shown = succeed(&[&start[..], &changed].concat());
+    assert!(shown.stderr.contains("of another scene"), "{}", shown.stderr);
+}
+
+#[test]
+fn every_camera_has_a_reference_of_its_own() {
+    let rooms = Rooms::new();
+    let words = "--size 16x9 --camera all --reference 8";
+    let reports = render(&rooms.folder, &scene("two_rooms_open"), &rooms.baked.path, "all", words);
+    for report in reports.as_array().unwrap() {
+        assert_eq!(report["reference"]["spp"], 8);
+        let error = &report["methods"][0]["error"];
+        assert!(error["verdict"].as_str().is_some_and(|v| v.contains("no error estimate")), "{error}");
+        assert!(report["methods"][0]["leak"]["dark_region"].is_null());
+    }
+    for camera in ["lit", "dark"] {
+        assert!(rooms.folder.path().join("all").join(camera).join("reference.exr").is_file());
+    }
+    let usage = crate::program::run(&[
+        "render",
+        "a.glb",
+        "a.probes",
+        "-o",
+        "x",
+        "--reference",
+        "16",
+        "--reference-image",
+        "a.exr",
+    ]);
+    assert_eq!(usage.code, Some(2));
+    assert!(usage.stderr.contains("--reference-image"), "{}", usage.stderr);
+}

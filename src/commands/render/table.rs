@@ -23,7 +23,7 @@ pub fn table(report: &RenderReport) -> String {
     let percent = |share: Option<f64>| share.map_or(format::UNDEFINED.to_owned(), format::percent);
     let mean = report.reference.as_ref().and_then(|r| r.irradiance_indirect_mean);
     for method in &report.methods {
-        let error = method.error.as_ref().map(|e| relative_rmse(&e.all, mean));
+        let error = errors_of(method).map(|e| relative_rmse(&e.all, mean));
         table.push([
             "probes".to_owned(),
             visibility(method).to_owned(),
@@ -53,6 +53,11 @@ pub fn table(report: &RenderReport) -> String {
     text
 }
 
+/// Against whichever transport the reference has: a run has only one.
+fn errors_of(method: &MethodReport) -> Option<&ErrorReport> {
+    method.error.as_ref().or(method.error_gltf.as_ref())
+}
+
 fn visibility(method: &MethodReport) -> &'static str {
     method.name.trim_start_matches("visibility_")
 }
@@ -72,12 +77,14 @@ fn relative_rmse(measured: &Measured, mean: Option<f64>) -> String {
 fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {
     let Some(reference) = &report.reference else { return Vec::new() };
     let errors: Vec<(&str, &ErrorReport)> =
-        report.methods.iter().filter_map(|m| Some((visibility(m), m.error.as_ref()?))).collect();
+        report.methods.iter().filter_map(|m| Some((visibility(m), errors_of(m)?))).collect();
     let Some((_, first)) = errors.first() else { return Vec::new() };
     let light = format::or_undefined(mean, |e| format::significant(e, 4));
     let noise = reference.standard_error_mean.zip(mean.filter(|m| *m > 0.0)).map(|(error, mean)| error / mean);
+    let glossy = report.methods.iter().any(|m| m.error_gltf.is_some());
+    let transport = if glossy { " (glossy, as probes are not)" } else { "" };
     let mut lines = vec![format!(
-        "error: root mean square difference from the reference ÷ its mean, {light} W·m⁻²; a pixel of it is known to {} on average",
+        "error: root mean square difference from the reference{transport} ÷ its mean, {light} W·m⁻²; a pixel of it is known to {} on average",
         format::or_undefined(noise, format::percent),
     )];
     let regions: [(&str, fn(&ErrorReport) -> &Measured); 2] =

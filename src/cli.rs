@@ -144,6 +144,14 @@ pub struct RenderArgs {
     /// Exposure of the PNG pictures, in powers of two; from the picture where not given.
     #[arg(long, value_name = "EV", allow_hyphen_values = true, value_parser = parse_exposure)]
     pub exposure: Option<f32>,
+    /// Path-trace a reference of every camera with so many samples per pixel, and report how far the probes are from it.
+    ///
+    /// Rounded up to a multiple of 16; from 32 on figures have standard errors.
+    #[arg(long, value_name = "SPP", conflicts_with = "reference_image", value_parser = clap::value_parser!(u32).range(1..=MAX_SPP))]
+    pub reference: Option<u32>,
+    /// The same with a reference that is there: of this camera and size, as `reference` or --reference wrote it.
+    #[arg(long, value_name = "FILE.exr")]
+    pub reference_image: Option<PathBuf>,
     /// Render although the scene has changed since the bake.
     #[arg(long)]
     pub allow_scene_change: bool,

@@ -1,34 +1,34 @@
 //! `lightprobe render`: scene + probes → pictures and report.
 
-use std::path::{Path, PathBuf};
+mod pictures;
+mod reference;
+mod table;
+
+use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Result, bail};
 use glam::Vec3;
 
+use self::reference::{Reference, Source};
 use super::camera::cameras;
 use super::{Console, load_scene, peak_memory_bytes, set_threads, write_json};
 use crate::cli::RenderArgs;
 use crate::config::Config;
-use crate::image::{LayeredImage, Picture8};
+use crate::image::LayeredImage;
 use crate::light::World;
 use crate::math::color::luminance;
 use crate::output::create_folder;
 use crate::probe::file::{self, ProbeFile};
 use crate::probe::query::{Query, VisibilitySettings};
 use crate::probe::{Volume, layout};
-use crate::report::colormap::Scale;
-use crate::report::format;
 use crate::report::header::Header;
-use crate::report::heatmap::{Heatmap, range_of};
-use crate::report::leak;
 use crate::report::render::{MethodReport, RenderReport, RenderTimes, SCHEMA, Spread};
-use crate::report::table::{Column, Table};
+use crate::report::{error, leak};
 use crate::scene::{Camera, Scene};
-use crate::shade::layers::{compose, to_pixels};
+use crate::shade::layers::compose;
 use crate::shade::methods::{Method, exact_masks, irradiance, time_lookup, time_shading};
 use crate::shade::points::{View, see};
-use crate::shade::spheres;
 
 /// What all cameras of a run share.
 struct Run<'a> {
@@ -39,6 +39,7 @@ struct Run<'a> {
     volume: &'a Volume,
     bytes_per_probe: f64,
     scene_changed: bool,
+    reference: Option<Source>,
     threads: usize,
     times: RenderTimes,
     started: Instant,
@@ -55,6 +56,7 @@ struct Shaded {
 pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
     let started = Instant::now();
     let threads = set_threads(args.trace.threads)?;
+    let reference = Source::of(args)?;
     let probes = file::read(&args.probes)?;
     let config = Config::parse(&probes.config, &format!("{}: its configuration", args.probes.display()))?;
     let scene = load_scene(&args.scene, &args.trace, &config, console)?;
@@ -68,6 +70,9 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
     let volume = volume_as_planned(&probes, &scene);
     let bytes_per_probe = runtime_bytes(&probes, &config);
     let cameras = cameras(&args.view, &world, console)?;
+    if args.reference_image.is_some() && cameras.len() > 1 {
+        bail!("--reference-image is of one camera and --camera all asks for {}; name one", cameras.len());
+    }
     let run = Run {
         args,
         console,
@@ -76,6 +81,7 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
         volume: &volume,
         bytes_per_probe,
         scene_changed,
+        reference,
         threads,
         times,
         started,
@@ -98,7 +104,7 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
         return console.print(&json);
     }
     for report in &reports {
-        console.print(&table(report))?;
+        console.print(&table::table(report))?;
     }
     console.print(&format!("wrote {}", args.output.display()))
 }
@@ -173,16 +179,27 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
             bytes_per_probe: run.bytes_per_probe,
             irradiance_indirect_mean: mean_luminance(&view, &irradiance),
             leak: leak::measure(&query, &view.points, &masks, method, &irradiance, &exact),
+            error: None,
+            error_gltf: None,
         };
         bar.inc(1);
         Shaded { method, image: compose(&view, &irradiance), irradiance, report }
     };
-    let shaded = Method::ALL.map(shade);
+    let mut shaded = Method::ALL.map(shade);
     bar.finish_and_clear();
+    let reference = Reference::obtain(run, camera, &view)?;
 
-    let exposure_ev = args.exposure.unwrap_or_else(|| exposure(&shaded[2]));
+    let exposure_ev = args.exposure.unwrap_or_else(|| exposure(&shaded[2], reference.as_ref()));
+    if let Some(reference) = &reference {
+        let bar = run.console.progress.stage("comparing", Method::ALL.len());
+        for s in &mut shaded {
+            compare(s, reference, exposure_ev, args.trace.seed);
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+    }
     create_folder(folder)?;
-    write_pictures(run, camera, &view, &shaded, exposure_ev, folder)?;
+    pictures::write(run, camera, &view, &shaded, reference.as_ref(), exposure_ev, folder)?;
     let report = RenderReport {
         header: Header::new(
             SCHEMA,
@@ -202,6 +219,7 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
         probes_active: volume.active_count(),
         time_s: RenderTimes { primary: primary_s, total: run.started.elapsed().as_secs_f64(), ..run.times },
         peak_memory_bytes: peak_memory_bytes(),
+        reference: reference.map(|r| r.summary),
         methods: shaded.into_iter().map(|s| s.report).collect(),
     };
     write_json(&folder.join("report.json"), &report)?;
@@ -215,106 +233,23 @@ fn mean_luminance(view: &View, irradiance: &[Vec3]) -> Option<f64> {
     (weight > 0.0).then(|| sum / weight)
 }
 
-/// Exposure of the whole run: that of the picture with exact visibility.
-fn exposure(shaded: &Shaded) -> f32 {
-    shaded.image.picture("beauty").map_or(0.0, |p| p.auto_exposure_ev())
+/// Exposure of the whole run: that of the reference, else of the picture with exact visibility.
+fn exposure(exact: &Shaded, reference: Option<&Reference>) -> f32 {
+    let own = || exact.image.picture("beauty").map_or(0.0, |p| p.auto_exposure_ev());
+    reference.map_or_else(own, |r| r.layers.beauty.auto_exposure_ev())
 }
 
-fn write_pictures(
-    run: &Run,
-    camera: &Camera,
-    view: &View,
-    shaded: &[Shaded; 3],
-    exposure_ev: f32,
-    folder: &Path,
-) -> Result<()> {
-    let file = |name: &str, extension: &str| -> PathBuf { folder.join(format!("{name}.{extension}")) };
-    let tonemapped = |image: &LayeredImage| match image.picture("beauty") {
-        Some(picture) => picture.tonemapped(exposure_ev),
-        None => Picture8::filled(view.width, view.height, [0; 3]),
-    };
-    for s in shaded {
-        s.image.write_exr(&file(s.method.name(), "exr"))?;
-        tonemapped(&s.image).write_png(&file(s.method.name(), "png"))?;
+/// Adds the figures that need a reference to a method's report.
+fn compare(shaded: &mut Shaded, reference: &Reference, exposure_ev: f32, seed: u64) {
+    let Reference { layers, regions, .. } = reference;
+    let irradiance = shaded.image.layer("irradiance_indirect").unwrap_or_default();
+    let flips = shaded.image.picture("beauty").map(|p| error::flip::measure(layers, &p, exposure_ev, regions, seed));
+    let error = Some(error::measure(layers, irradiance, regions, flips.as_ref()));
+    if reference.glossy {
+        shaded.report.error_gltf = error;
+    } else {
+        shaded.report.error = error;
     }
-    let [off, on, exact] = shaded;
-    let difference = |s: &Shaded| {
-        let signed = |i: usize| Vec3::splat(luminance(s.irradiance[i]) - luminance(exact.irradiance[i]));
-        to_pixels(view, |i, _| signed(i))
-    };
-    let (off_leak, on_leak) = (difference(off), difference(on));
-    let mut image = LayeredImage::new(view.width, view.height);
-    image.push("leak_on", on_leak.clone());
-    image.push("leak_off", off_leak.clone());
-    image.write_exr(&file("leak", "exr"))?;
-    leak_map(view, &off_leak, &on_leak).write_png(&file("leak", "png"))?;
-    let probes = spheres::draw(&tonemapped(&exact.image), view, camera, run.volume, exposure_ev);
-    probes.write_png(&file("probes", "png"))?;
-    Ok(())
-}
-
-/// Both signed differences side by side under one scale: without visibility on the left, with it on the right.
-fn leak_map(view: &View, off: &[Vec3], on: &[Vec3]) -> Picture8 {
-    let mut has_surface = vec![false; off.len()];
-    view.points.iter().for_each(|p| has_surface[p.pixel as usize] = true);
-    let width = view.width as usize;
-    let mut values = Vec::with_capacity(2 * off.len());
-    for row in 0..view.height as usize {
-        for half in [off, on] {
-            let pixels = row * width..(row + 1) * width;
-            values.extend(pixels.map(|i| if has_surface[i] { half[i].x } else { f32::NAN }));
-        }
-    }
-    Heatmap {
-        values: &values,
-        width: 2 * view.width,
-        height: view.height,
-        range: range_of(&values, Scale::Diverging),
-        scale: Scale::Diverging,
-        title: "irradiance against exact visibility: left without, right with visibility",
-        unit: "W·m⁻²",
-        missing: "no surface",
-    }
-    .draw()
-    .picture
-}
-
-fn table(report: &RenderReport) -> String {
-    let mut table = Table::new(&[
-        ("method", Column::Text),
-        ("visibility", Column::Text),
-        ("shade", Column::Number),
-        ("rays", Column::Number),
-        ("look-up", Column::Number),
-        ("memory per probe", Column::Number),
-        ("leak light", Column::Number),
-        ("leak dark", Column::Number),
-        ("hidden share", Column::Number),
-        ("irradiance", Column::Number),
-        ("error", Column::Number),
-    ]);
-    let percent = |share: Option<f64>| share.map_or(format::UNDEFINED.to_owned(), format::percent);
-    for method in &report.methods {
-        table.push([
-            "probes".to_owned(),
-            method.name.trim_start_matches("visibility_").to_owned(),
-            format::seconds(method.shade_ms.median / 1e3),
-            format::seconds(method.ray_ms / 1e3),
-            method.lookup_ns.map_or(format::UNDEFINED.to_owned(), |ns| format::seconds(ns / 1e9)),
-            format::bytes(method.bytes_per_probe.round() as u64),
-            percent(method.leak.light),
-            percent(method.leak.dark),
-            percent(method.leak.fraction),
-            method.irradiance_indirect_mean.map_or(format::UNDEFINED.to_owned(), |e| format::significant(e, 4)),
-            format::UNDEFINED.to_owned(),
-        ]);
-    }
-    format!(
-        "camera {}, {}×{}, exposure {:+.2} EV, {} of the points see no probe\n{table}",
-        report.camera,
-        report.width,
-        report.height,
-        report.exposure_ev,
-        format::percent(report.methods.first().map_or(0.0, |m| m.leak.unseen)),
-    )
+    let shown: Vec<bool> = regions.iter().map(Option::is_some).collect();
+    shaded.report.leak.dark_region = leak::dark_region(irradiance, layers, &shown);
 }

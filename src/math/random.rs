@@ -20,6 +20,8 @@ pub enum Purpose {
     Path = 5,
     /// Paths from what capture rays hit.
     ProbePaths = 6,
+    /// Noise that is added to a reference, to see what its own noise does to FLIP.
+    FlipReplicate = 16,
 }
 
 /// Where random decisions take their numbers from: a [`Random`] stream, or points that cover their domain evenly

@@ -3,6 +3,7 @@
 pub mod bake;
 pub mod canvas;
 pub mod colormap;
+pub mod error;
 pub mod font;
 pub mod format;
 pub mod header;
@@ -10,6 +11,7 @@ pub mod heatmap;
 pub mod leak;
 pub mod legend;
 pub mod reference;
+pub mod reference_layers;
 pub mod render;
 pub mod table;
 pub mod text;

@@ -7,4 +7,5 @@ pub mod methods;
 pub mod points;
 pub mod reference;
 pub mod reference_file;
+pub mod regions;
 pub mod spheres;

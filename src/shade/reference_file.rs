@@ -60,6 +60,31 @@ impl Identity {
     }
 }
 
+/// What of an [`Identity`] says which picture it is; the rest says how it was made.
+const PICTURE: &[&str] = &["scene_blake3", "punctual_scale", "albedo_max", "camera_view", "size"];
+
+impl Identity {
+    /// What makes a picture from a file another than this one, of the scene, camera and size; `None` where it is the same, or
+    /// its file does not say.
+    pub fn other_picture(&self, image: &LayeredImage) -> Option<&'static str> {
+        let differs = |name: &&&str| image.texts.get(**name).is_some_and(|found| self.0.get(**name) != Some(found));
+        PICTURE.iter().find(differs).map(|name| describe(name))
+    }
+}
+
+/// A part of an identity in words.
+fn describe(name: &'static str) -> &'static str {
+    match name {
+        "scene_blake3" => "scene (its files or its sky)",
+        "punctual_scale" => "lights.punctual_scale",
+        "albedo_max" => "solver.albedo_max",
+        "camera_view" => "camera view",
+        "max_bounces" => "max bounces",
+        "firefly_clamp" => "firefly clamp",
+        name => name,
+    }
+}
+
 impl Reference {
     /// Writes the picture with what [`Reference::read`] and [`resume`] need.
     ///
@@ -138,10 +163,7 @@ pub fn resume(
         if found != wanted {
             return Err(ReferenceError::Different {
                 path: path.to_owned(),
-                what: match *name {
-                    "scene_blake3" => "scene (its files or its sky)".to_owned(),
-                    name => name.replace('_', " "),
-                },
+                what: describe(name).to_owned(),
                 found: found.to_owned(),
                 wanted: wanted.clone(),
             });

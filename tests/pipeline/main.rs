@@ -7,6 +7,7 @@ mod closed_forms;
 mod command_line;
 #[path = "../common/mod.rs"]
 mod common;
+mod comparison;
 mod damage;
 mod decoding;
 mod determinism;

@@ -21,7 +21,9 @@ use crate::math::color::luminance;
 use crate::output::create_folder;
 use crate::probe::file::{self, ProbeFile};
 use crate::probe::query::{Query, VisibilitySettings};
+use crate::probe::truth::Truth;
 use crate::probe::{Volume, layout};
+use crate::report::baked::{self, BakedReport};
 use crate::report::header::Header;
 use crate::report::render::{MethodReport, RenderReport, RenderTimes, SCHEMA, Spread};
 use crate::report::{error, leak};
@@ -29,6 +31,10 @@ use crate::scene::{Camera, Scene};
 use crate::shade::layers::compose;
 use crate::shade::methods::{Method, exact_masks, irradiance, time_lookup, time_shading};
 use crate::shade::points::{View, see};
+use crate::shade::reference::ReferenceSettings;
+
+/// Name in the report of probes lit by full paths, with exact visibility.
+pub const PATH_RAY: &str = "path_ray";
 
 /// What all cameras of a run share.
 struct Run<'a> {
@@ -40,9 +46,32 @@ struct Run<'a> {
     bytes_per_probe: f64,
     scene_changed: bool,
     reference: Option<Source>,
+    truth: Option<BakedTruth>,
     threads: usize,
     times: RenderTimes,
     started: Instant,
+}
+
+/// The file's probes lit by full paths, and how the file's own differ from them.
+struct BakedTruth {
+    truth: Truth,
+    report: BakedReport,
+}
+
+impl BakedTruth {
+    /// Hits are many, and each path that leaves one is a sample of its own: few from each do.
+    const REFERENCE_SPP_PER_PATH: u32 = 128;
+
+    /// With a traced reference, and in proportion to its samples.
+    fn trace(world: &World, config: &Config, volume: &Volume, settings: &ReferenceSettings, console: &Console) -> Self {
+        let started = Instant::now();
+        let paths = (settings.spp / Self::REFERENCE_SPP_PER_PATH).max(1);
+        let truth = Truth::trace(world, &config.capture, volume, paths, settings.seed, console.progress);
+        let (figures, standard_error) = baked::measure(volume, &truth);
+        let paths_per_hit = u64::from(paths) * truth.runs.len() as u64;
+        let report = BakedReport { figures, standard_error, paths_per_hit, time_s: started.elapsed().as_secs_f64() };
+        BakedTruth { truth, report }
+    }
 }
 
 /// One method's results.
@@ -73,6 +102,10 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
     if args.reference_image.is_some() && cameras.len() > 1 {
         bail!("--reference-image is of one camera and --camera all asks for {}; name one", cameras.len());
     }
+    let truth = match &reference {
+        Some(Source::Trace { settings }) => Some(BakedTruth::trace(&world, &config, &volume, settings, console)),
+        _ => None,
+    };
     let run = Run {
         args,
         console,
@@ -82,6 +115,7 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
         bytes_per_probe,
         scene_changed,
         reference,
+        truth,
         threads,
         times,
         started,
@@ -186,13 +220,29 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
         Shaded { method, image: compose(&view, &irradiance), irradiance, report }
     };
     let mut shaded = Method::ALL.map(shade);
+    // What is left of the error when the probes are right and visibility exact comes from interpolation between probes.
+    let mut path_traced = run.truth.as_ref().map(|BakedTruth { truth, .. }| {
+        let query = Query { volume: &truth.volume, settings: &run.config.query };
+        let irradiance = irradiance(&query, &view.points, &masks, Method::Ray);
+        let report = MethodReport {
+            name: PATH_RAY,
+            irradiance_indirect_mean: mean_luminance(&view, &irradiance),
+            leak: leak::measure(&query, &view.points, &masks, Method::Ray, &irradiance, &irradiance),
+            ..shaded[2].report.clone()
+        };
+        Shaded { method: Method::Ray, image: compose(&view, &irradiance), irradiance, report }
+    });
+    let baked = run.truth.as_ref().map(|t| t.report.clone());
+    for s in &mut shaded {
+        s.report.leak.baked = baked.as_ref().and_then(|b| b.figures.light);
+    }
     bar.finish_and_clear();
     let reference = Reference::obtain(run, camera, &view)?;
 
     let exposure_ev = args.exposure.unwrap_or_else(|| exposure(&shaded[2], reference.as_ref()));
     if let Some(reference) = &reference {
         let bar = run.console.progress.stage("comparing", Method::ALL.len());
-        for s in &mut shaded {
+        for s in shaded.iter_mut().chain(&mut path_traced) {
             compare(s, reference, exposure_ev, args.trace.seed);
             bar.inc(1);
         }
@@ -220,7 +270,8 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
         time_s: RenderTimes { primary: primary_s, total: run.started.elapsed().as_secs_f64(), ..run.times },
         peak_memory_bytes: peak_memory_bytes(),
         reference: reference.map(|r| r.summary),
-        methods: shaded.into_iter().map(|s| s.report).collect(),
+        baked,
+        methods: shaded.into_iter().chain(path_traced).map(|s| s.report).collect(),
     };
     write_json(&folder.join("report.json"), &report)?;
     Ok(report)

@@ -37,7 +37,7 @@ pub enum ReflectedLight {
     ThroughProbes,
     /// Paths are traced from every hit until they end: the truth at the probes, up to resolution and noise.
     PathTraced {
-        /// At every hit; whole blocks of [`BLOCK`].
+        /// At every hit.
         paths: u32,
     },
 }
@@ -305,26 +305,22 @@ impl Capture<'_, '_> {
     fn light_by_paths(&self, probe: usize, ray: &TexelRay, surface: &SurfacePoint, paths: u32, out: &mut ProbeCapture) {
         let world = self.world;
         let normal = surface.shading_normal;
-        let (settings, blocks) = (PathSettings::default(), paths.div_ceil(BLOCK));
+        let settings = PathSettings::default();
+        let hit = out.surfels.len() as u64;
+        let block = |i: u32| Block::new(self.seed, Purpose::ProbePaths, probe as u64, hit << 32 | u64::from(i / BLOCK));
         let mut sum = DVec3::ZERO;
-        let mut salt = 0;
-        for block in 0..blocks {
-            let hit = out.surfels.len() as u64;
-            let block = Block::new(self.seed, Purpose::ProbePaths, probe as u64, hit << 32 | u64::from(block));
-            for i in 0..BLOCK {
-                let mut numbers = block.sample(i);
-                salt = numbers.salt();
-                let gathered = world.gather(surface, normal, -ray.direction, &settings, &mut numbers, &mut out.rays);
-                if gathered.irradiance.is_finite() {
-                    sum += gathered.irradiance.as_dvec3();
-                } else {
-                    out.non_finite += 1;
-                }
+        for i in 0..paths {
+            let mut numbers = block(i).sample(i % BLOCK);
+            let gathered = world.gather(surface, normal, -ray.direction, &settings, &mut numbers, &mut out.rays);
+            if gathered.irradiance.is_finite() {
+                sum += gathered.irradiance.as_dvec3();
+            } else {
+                out.non_finite += 1;
             }
         }
-        let (punctual, shadow_rays) = world.punctual_irradiance(surface, normal, salt);
+        let (punctual, shadow_rays) = world.punctual_irradiance(surface, normal, block(0).sample(0).salt());
         out.rays.shadow += u64::from(shadow_rays);
-        let irradiance = punctual + (sum / f64::from((blocks * BLOCK).max(1))).as_vec3();
+        let irradiance = punctual + (sum / f64::from(paths.max(1))).as_vec3();
         let radiance = reflected_radiance(surface.albedo, irradiance);
         out.surfels.push(Surfel::new(&SurfacePoint { albedo: Vec3::ZERO, ..*surface }, radiance, ray.texel, ray.share));
     }

@@ -19,6 +19,7 @@ pub mod query;
 pub mod solver;
 pub mod surface_visibility;
 pub mod survey;
+pub mod truth;
 pub mod volume;
 
 pub use grid::{Grid, ProbeIndex};

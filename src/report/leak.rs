@@ -28,6 +28,9 @@ pub struct Leak {
     /// Mean irradiance where the reference has none, as a share of the reference's mean: see [`dark_region`]; `null` without a
     /// reference.
     pub dark_region: Option<f64>,
+    /// Σ max(0, E_p − E_path) ÷ ΣE_path over active probes: what leaked into the probes themselves
+    /// ([`super::baked`]); `null` without a traced reference.
+    pub baked: Option<f64>,
 }
 
 /// Irradiance that counts as none, as a share of the reference's mean over the picture.
@@ -108,5 +111,6 @@ pub fn measure(
         weight: ratio(hidden_weight, seen),
         unseen: ratio(unseen, seen + unseen).unwrap_or(0.0),
         dark_region: None,
+        baked: None,
     }
 }

@@ -1,6 +1,7 @@
 //! Figures and pictures for people and machines: reports, tables, false-colour pictures, text in pictures.
 
 pub mod bake;
+pub mod baked;
 pub mod canvas;
 pub mod colormap;
 pub mod error;

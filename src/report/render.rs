@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::baked::BakedReport;
 use super::error::ErrorReport;
 use super::header::Header;
 use super::leak::Leak;
@@ -29,6 +30,8 @@ pub struct RenderReport {
     pub peak_memory_bytes: u64,
     /// What the methods' `error` compares with.
     pub reference: Option<ReferenceSummary>,
+    /// The file's probes against the same probes lit by full paths; `null` without a traced reference.
+    pub baked: Option<BakedReport>,
     pub methods: Vec<MethodReport>,
 }
 

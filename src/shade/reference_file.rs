@@ -66,8 +66,9 @@ impl Identity {
     /// What makes a picture from a file another than this one, of the scene, camera and size; `None` where it is the same, or
     /// its file does not say.
     pub fn other_picture(&self, image: &LayeredImage) -> Option<&'static str> {
-        let differs = |name: &&&str| image.texts.get(**name).is_some_and(|found| self.0.get(**name) != Some(found));
-        PICTURE.iter().find(differs).map(|name| describe(name))
+        let own = self.0.iter().filter(|(name, _)| PICTURE.contains(name));
+        let mut differing = own.filter(|(name, text)| image.texts.get(*name).is_some_and(|found| found != text));
+        differing.next().map(|(name, _)| describe(name))
     }
 }
 

@@ -1,5 +1,7 @@
 //! A render's report for people.
 
+use super::PATH_RAY;
+use crate::report::baked::BakedReport;
 use crate::report::error::{ErrorReport, Measured};
 use crate::report::format;
 use crate::report::render::{MethodReport, RenderReport};
@@ -25,7 +27,7 @@ pub fn table(report: &RenderReport) -> String {
     for method in &report.methods {
         let error = errors_of(method).map(|e| relative_rmse(&e.all, mean));
         table.push([
-            "probes".to_owned(),
+            if method.name == PATH_RAY { "path-traced probes" } else { "probes" }.to_owned(),
             visibility(method).to_owned(),
             format::seconds(method.shade_ms.median / 1e3),
             format::seconds(method.ray_ms / 1e3),
@@ -59,7 +61,12 @@ fn errors_of(method: &MethodReport) -> Option<&ErrorReport> {
 }
 
 fn visibility(method: &MethodReport) -> &'static str {
-    method.name.trim_start_matches("visibility_")
+    if method.name == PATH_RAY { "ray" } else { method.name.trim_start_matches("visibility_") }
+}
+
+/// A method in a sentence.
+fn label(method: &MethodReport) -> &'static str {
+    if method.name == PATH_RAY { "path-traced probes" } else { visibility(method) }
 }
 
 /// Root mean square error ÷ mean irradiance of the reference, with the standard error that its noise gives it. Where the reference is
@@ -77,7 +84,7 @@ fn relative_rmse(measured: &Measured, mean: Option<f64>) -> String {
 fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {
     let Some(reference) = &report.reference else { return Vec::new() };
     let errors: Vec<(&str, &ErrorReport)> =
-        report.methods.iter().filter_map(|m| Some((visibility(m), errors_of(m)?))).collect();
+        report.methods.iter().filter_map(|m| Some((label(m), errors_of(m)?))).collect();
     let Some((_, first)) = errors.first() else { return Vec::new() };
     let light = format::or_undefined(mean, |e| format::significant(e, 4));
     let noise = reference.standard_error_mean.zip(mean.filter(|m| *m > 0.0)).map(|(error, mean)| error / mean);
@@ -100,7 +107,23 @@ fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {
         lines.push(format!("  {name} ({share} of the picture's surfaces): {}", figures.join(", ")));
     }
     lines.extend(verdicts(&errors));
+    lines.extend(report.baked.as_ref().map(baked_line));
     lines
+}
+
+/// What is wrong with the probes themselves.
+fn baked_line(baked: &BakedReport) -> String {
+    let BakedReport { figures, standard_error, .. } = baked;
+    let percent = |value: Option<f64>, error: Option<f64>| match value {
+        Some(value) => format!("{} %", format::with_error(100.0 * value, error.map(|e| 100.0 * e))),
+        None => format::UNDEFINED.to_owned(),
+    };
+    format!(
+        "probes against path-traced ones: bias {}, excess {}, loss {} of their irradiance; the rest of the error is interpolation",
+        percent(figures.bias, standard_error.bias),
+        percent(figures.light, standard_error.light),
+        percent(figures.dark, standard_error.dark),
+    )
 }
 
 /// Each verdict once, with the methods and regions that it is about.

@@ -7,6 +7,7 @@
 
 mod blended;
 mod furnace;
+mod gltf;
 mod lights;
 mod program;
 mod skies;

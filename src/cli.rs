@@ -171,7 +171,8 @@ pub struct ReferenceArgs {
     /// they are, for a quick look without a known error.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MAX_SPP))]
     pub spp: u32,
-    /// Reflection: `lambert` as in probes, every surface diffuse.
+    /// Reflection: `lambert` as in probes, every surface diffuse; `gltf` with the glossy lobes of metallic-roughness
+    /// materials, in a layer `glossy` too.
     #[arg(long, value_enum, default_value = "lambert")]
     pub transport: TransportName,
     #[command(flatten)]
@@ -203,6 +204,7 @@ const MAX_SPP: i64 = 1 << 30;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum TransportName {
     Lambert,
+    Gltf,
 }
 
 #[derive(Debug, Args)]

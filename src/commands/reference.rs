@@ -47,6 +47,7 @@ pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
         seed: args.trace.seed,
         transport: match args.transport {
             TransportName::Lambert => Transport::Lambert,
+            TransportName::Gltf => Transport::Gltf,
         },
         max_bounces: args.max_bounces,
         strategy: Strategy::Mis,

@@ -2,6 +2,7 @@
 
 pub mod bsdf;
 pub mod emitters;
+pub mod ggx;
 pub mod lambert;
 pub mod path;
 pub mod punctual;

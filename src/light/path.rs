@@ -78,7 +78,7 @@ impl World<'_> {
         numbers: &mut BlockSample,
         rays: &mut RayCount,
     ) -> Gathered {
-        let bsdf = Bsdf::new(self, point, normal, view, settings.transport);
+        let bsdf = Bsdf::new(self, point, normal, view, settings.transport).covering();
         let mut gathered = Gathered::default();
         if let Some((direction, cosine, radiance)) = self.emitter_sample(point, &bsdf, settings, 0, numbers, rays) {
             let scattered = bsdf.scattered(direction, cosine);

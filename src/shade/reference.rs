@@ -12,11 +12,11 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::film::{Film, Noise, Quantity, add_block};
-use super::layers::compose;
+use super::layers::{compose, to_pixels};
 use super::points::{ImagePoint, View, has_blend, see, see_pixel};
 use crate::image::LayeredImage;
 use crate::light::World;
-use crate::light::bsdf::Transport;
+use crate::light::bsdf::{Bsdf, Transport};
 use crate::light::lambert::reflected_radiance;
 use crate::light::path::{PathSettings, Strategy};
 use crate::light::sampled::RayCount;
@@ -28,12 +28,25 @@ use crate::scene::Camera;
 /// Pixels that a thread takes at a time: some milliseconds of work.
 const RUN: usize = 32;
 
-/// What is accumulated where pixels show one point each, Lambertian or not, and where they show several.
+/// What is accumulated where pixels show one point each, and where they show several.
 const LAMBERT: &[Quantity] = &[Quantity::IrradianceIndirect];
+const GLTF: &[Quantity] = &[Quantity::IrradianceIndirect, Quantity::Beauty, Quantity::Indirect, Quantity::Glossy];
 const BLENDED: &[Quantity] = &[
     Quantity::IrradianceIndirect,
     Quantity::Beauty,
     Quantity::Indirect,
+    Quantity::Emission,
+    Quantity::Direct,
+    Quantity::IrradianceDirect,
+    Quantity::Albedo,
+    Quantity::Normal,
+    Quantity::Depth,
+];
+const BLENDED_GLTF: &[Quantity] = &[
+    Quantity::IrradianceIndirect,
+    Quantity::Beauty,
+    Quantity::Indirect,
+    Quantity::Glossy,
     Quantity::Emission,
     Quantity::Direct,
     Quantity::IrradianceDirect,
@@ -201,6 +214,8 @@ struct FixedView {
     view: View,
     /// Per pixel; `NO_POINT` for the sky.
     point_of_pixel: Vec<u32>,
+    /// Radiance that each point reflects of punctual lights.
+    direct: Vec<Vec3>,
 }
 
 const NO_POINT: u32 = u32::MAX;
@@ -220,7 +235,9 @@ impl<'a> Tracing<'a> {
             let view = see(world, camera, width, height, settings.seed);
             let mut point_of_pixel = vec![NO_POINT; pixels];
             view.points.iter().enumerate().for_each(|(i, p)| point_of_pixel[p.pixel as usize] = i as u32);
-            FixedView { view, point_of_pixel }
+            let direct = |p: &ImagePoint| direct_radiance(world, p, settings.transport, p.pixel);
+            let direct = view.points.par_iter().map(direct).collect();
+            FixedView { view, point_of_pixel, direct }
         });
         let state = previous.unwrap_or_else(|| State {
             film: Film::new(quantities(world, settings.transport), pixels),
@@ -276,11 +293,14 @@ impl<'a> Tracing<'a> {
         let mut means = [DVec3::ZERO; MOST];
         match &self.view {
             Some(fixed) => {
-                let point = fixed.point_of_pixel[pixel as usize];
-                if point != NO_POINT {
-                    let point = std::slice::from_ref(&fixed.view.points[point as usize]);
-                    self.add_points(point, pixel, block, samples, &mut means, counts);
+                let index = fixed.point_of_pixel[pixel as usize];
+                let mut seen = fixed.view.sky[pixel as usize];
+                if index != NO_POINT {
+                    let point = &fixed.view.points[index as usize];
+                    self.add_points(std::slice::from_ref(point), pixel, block, samples, &mut means, counts);
+                    seen += point.surface.emission + fixed.direct[index as usize];
                 }
+                means[Quantity::Beauty as usize] = seen.as_dvec3() + means[Quantity::Indirect as usize];
             }
             None => {
                 let mut random = Random::new(self.settings.seed, Purpose::Pixel, u64::from(pixel), u64::from(block));
@@ -288,7 +308,7 @@ impl<'a> Tracing<'a> {
                     see_pixel(self.world, self.camera, self.width, self.height, pixel, samples, &mut random);
                 self.add_points(&points, pixel, block, samples, &mut means, counts);
                 for point in &points {
-                    self.add_seen(point, &mut means);
+                    self.add_seen(point, random.bits(), &mut means);
                 }
                 means[Quantity::Emission as usize] += sky.as_dvec3();
                 means[Quantity::Beauty as usize] =
@@ -334,10 +354,10 @@ impl<'a> Tracing<'a> {
     }
 
     /// Adds what is known of a point without paths.
-    fn add_seen(&self, point: &ImagePoint, means: &mut [DVec3; MOST]) {
+    fn add_seen(&self, point: &ImagePoint, salt: u32, means: &mut [DVec3; MOST]) {
         let mut add = |quantity: Quantity, value: Vec3| means[quantity as usize] += (value * point.weight).as_dvec3();
         add(Quantity::Emission, point.surface.emission);
-        add(Quantity::Direct, reflected_radiance(point.surface.albedo, point.irradiance_direct));
+        add(Quantity::Direct, direct_radiance(self.world, point, self.settings.transport, salt));
         add(Quantity::IrradianceDirect, point.irradiance_direct);
         add(Quantity::Albedo, point.surface.albedo);
         add(Quantity::Normal, point.normal);
@@ -368,8 +388,24 @@ impl<'a> Tracing<'a> {
 }
 
 /// What has to be accumulated in this world.
-pub fn quantities(world: &World, _transport: Transport) -> &'static [Quantity] {
-    if has_blend(world) { BLENDED } else { LAMBERT }
+pub fn quantities(world: &World, transport: Transport) -> &'static [Quantity] {
+    match (has_blend(world), transport) {
+        (false, Transport::Lambert) => LAMBERT,
+        (false, Transport::Gltf) => GLTF,
+        (true, Transport::Lambert) => BLENDED,
+        (true, Transport::Gltf) => BLENDED_GLTF,
+    }
+}
+
+/// Radiance that a point reflects of punctual lights, W·m⁻²·sr⁻¹.
+fn direct_radiance(world: &World, point: &ImagePoint, transport: Transport, salt: u32) -> Vec3 {
+    match transport {
+        Transport::Lambert => reflected_radiance(point.surface.albedo, point.irradiance_direct),
+        Transport::Gltf => {
+            let bsdf = Bsdf::new(world, &point.surface, point.normal, point.view, transport);
+            world.punctual_radiance(&point.surface, &bsdf, salt)
+        }
+    }
 }
 
 fn develop_fixed(film: &Film, fixed: &FixedView) -> LayeredImage {
@@ -377,7 +413,13 @@ fn develop_fixed(film: &Film, fixed: &FixedView) -> LayeredImage {
     let pixels = film.mean(Quantity::IrradianceIndirect).unwrap_or_default();
     let at_points: Vec<Vec3> = view.points.iter().map(|p| pixels[p.pixel as usize]).collect();
     let mut image = compose(view, &at_points);
-    if let Some(variance) = film.variance(Quantity::IrradianceIndirect) {
+    if film.quantities() == GLTF {
+        for quantity in [Quantity::Beauty, Quantity::Indirect, Quantity::Glossy] {
+            image.push(quantity.name(), film.mean(quantity).unwrap_or_default());
+        }
+        image.push(Quantity::Direct.name(), to_pixels(view, |i, _| fixed.direct[i]));
+        push_variances(film, &mut image);
+    } else if let Some(variance) = film.variance(Quantity::IrradianceIndirect) {
         let mut beauty = vec![Vec3::ZERO; variance.len()];
         for p in &view.points {
             // A reflected radiance is linear in the irradiance, so its variance is scaled by the square.
@@ -397,6 +439,12 @@ fn develop_blended(film: &Film, width: u32, height: u32) -> LayeredImage {
             image.push(quantity.name(), mean);
         }
     }
+    push_variances(film, &mut image);
+    image
+}
+
+/// Variances as they were accumulated.
+fn push_variances(film: &Film, image: &mut LayeredImage) {
     for (quantity, name) in
         [(Quantity::Beauty, BEAUTY_VARIANCE), (Quantity::IrradianceIndirect, IRRADIANCE_INDIRECT_VARIANCE)]
     {
@@ -404,7 +452,6 @@ fn develop_blended(film: &Film, width: u32, height: u32) -> LayeredImage {
             image.push(name, variance);
         }
     }
-    image
 }
 
 /// What a thread counts.

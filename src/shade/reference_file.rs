@@ -3,7 +3,6 @@
 //! Beside the layers stand the texts of [`Identity`], `spp`, `non_finite`, `rays_*` and `noise_*` (the attribute
 //! `lightprobe`, JSON), and the state of the film as words (channels `state.*`, whole numbers; [`Film::store`]).
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::film::{Film, Noise};
@@ -34,16 +33,16 @@ pub enum ReferenceError {
     NoState { path: PathBuf },
 }
 
-/// All that a reference's samples depend on, by name.
+/// All that a reference's samples depend on, by name; what explains most comes first.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Identity(BTreeMap<&'static str, String>);
+pub struct Identity(Vec<(&'static str, String)>);
 
 impl Identity {
     pub fn new(world: &World, camera: &Camera, width: u32, height: u32, settings: &ReferenceSettings) -> Identity {
         let optional = |x: Option<String>| x.unwrap_or_else(|| "none".to_owned());
         // Shortest texts that read back to the same number: equal texts are equal numbers.
         let camera_numbers = format!("{:?} {:?} {:?}", camera.position, camera.world_from_camera, camera.projection);
-        Identity(BTreeMap::from([
+        Identity(vec![
             ("format", FORMAT.to_owned()),
             ("scene_blake3", world.scene.blake3.clone()),
             ("punctual_scale", world.punctual_scale.to_string()),
@@ -56,7 +55,7 @@ impl Identity {
             ("strategy", format!("{:?}", settings.strategy).to_lowercase()),
             ("max_bounces", optional(settings.max_bounces.map(|b| b.to_string()))),
             ("firefly_clamp", optional(settings.firefly_clamp.map(|c| c.to_string()))),
-        ]))
+        ])
     }
 }
 

@@ -17,5 +17,6 @@ mod leaks;
 mod plan;
 mod probe_file;
 mod program;
+mod reference;
 mod reports;
 mod shapes;

@@ -66,8 +66,10 @@ impl Identity {
     /// What makes a picture from a file another than this one, of the scene, camera and size; `None` where it is the same, or
     /// its file does not say.
     pub fn other_picture(&self, image: &LayeredImage) -> Option<&'static str> {
-        let differs = |name: &&&str| image.texts.get(**name).is_some_and(|found| self.0.get(**name) != Some(found));
-        PICTURE.iter().find(differs).map(|name| describe(name))
+        let differs = |(name, wanted): &&(&'static str, String)| {
+            PICTURE.contains(name) && image.texts.get(*name).is_some_and(|found| found != wanted)
+        };
+        self.0.iter().find(differs).map(|(name, _)| describe(name))
     }
 }
 

@@ -73,6 +73,9 @@ fn relative_rmse(measured: &Measured, mean: Option<f64>) -> String {
     }
 }
 
+/// Picks one region's figures.
+type Part = fn(&ErrorReport) -> &Measured;
+
 /// What the error is relative to, each region's errors, and what speaks against relying on them.
 fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {
     let Some(reference) = &report.reference else { return Vec::new() };
@@ -87,8 +90,7 @@ fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {
         "error: root mean square difference from the reference{transport} ÷ its mean, {light} W·m⁻²; a pixel of it is known to {} on average",
         format::or_undefined(noise, format::percent),
     )];
-    let regions: [(&str, fn(&ErrorReport) -> &Measured); 2] =
-        [("in corners", |e| &e.by_region.corner), ("elsewhere", |e| &e.by_region.flat)];
+    let regions: [(&str, Part); 2] = [("in corners", |e| &e.by_region.corner), ("elsewhere", |e| &e.by_region.flat)];
     for (name, region) in regions {
         let pixels = region(first).pixels;
         if pixels == 0 {

@@ -14,7 +14,12 @@
 //! | `flip` | mean of LDR-FLIP's map | [`flip`] |
 //!
 //! The peak is the largest value of the reference, as is usual for pictures without a largest possible one.
-//! Standard errors follow from v by the delta method ([`pooled::Pooled`]); pixels are independent.
+//! Standard errors follow from v by the delta method ([`pooled::Pooled`]); pixels are independent. To them comes what the
+//! corrections themselves may be wrong by: a share of b, and relative squares where the noise is as large as what they are
+//! relative to.
+//!
+//! The reference is too noisy for some part of the picture where there Σv > Σ(d² − v): the noise exceeds the difference. Figures
+//! pooled over many pixels may be well determined all the same, which is what their standard errors say.
 
 pub mod flip;
 pub mod pooled;

@@ -84,7 +84,7 @@ fn figures(volume: &Volume, truth: &Truth, without: Option<usize>) -> BakedFigur
         // How large differences are, from all of the probe's texels: that of one is as noisy as itself.
         let size = found.iter().map(|(_, d, v)| d * d - v).sum::<f64>() / texels.max(1) as f64;
         for (weight, d, v) in found {
-            let folded = fold(size, v) / 2.0;
+            let folded = fold(d, size.max(0.0).sqrt(), v) / 2.0;
             sums.difference += weight * d;
             sums.over += weight * (d.max(0.0) - folded);
             sums.under += weight * ((-d).max(0.0) - folded);

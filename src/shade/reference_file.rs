@@ -65,23 +65,19 @@ const PICTURE: &[&str] = &["scene_blake3", "punctual_scale", "albedo_max", "came
 impl Identity {
     /// What makes a picture from a file another than this one, of the scene, camera and size; `None` where it is the same, or
     /// its file does not say.
-    pub fn other_picture(&self, image: &LayeredImage) -> Option<&'static str> {
-        let own = self.0.iter().filter(|(name, _)| PICTURE.contains(name));
-        let mut differing = own.filter(|(name, text)| image.texts.get(*name).is_some_and(|found| found != text));
-        differing.next().map(|(name, _)| describe(name))
+    pub fn other_picture(&self, image: &LayeredImage) -> Option<String> {
+        let differs = |(name, wanted): &&(&'static str, String)| {
+            PICTURE.contains(name) && image.texts.get(*name).is_some_and(|found| found != wanted)
+        };
+        self.0.iter().find(differs).map(|(name, _)| describe(name))
     }
 }
 
 /// A part of an identity in words.
-fn describe(name: &'static str) -> &'static str {
+fn describe(name: &str) -> String {
     match name {
-        "scene_blake3" => "scene (its files or its sky)",
-        "punctual_scale" => "lights.punctual_scale",
-        "albedo_max" => "solver.albedo_max",
-        "camera_view" => "camera view",
-        "max_bounces" => "max bounces",
-        "firefly_clamp" => "firefly clamp",
-        name => name,
+        "scene_blake3" => "scene (its files or its sky)".to_owned(),
+        name => name.replace('_', " "),
     }
 }
 
@@ -163,7 +159,7 @@ pub fn resume(
         if found != wanted {
             return Err(ReferenceError::Different {
                 path: path.to_owned(),
-                what: describe(name).to_owned(),
+                what: describe(name),
                 found: found.to_owned(),
                 wanted: wanted.clone(),
             });

@@ -227,3 +227,16 @@ fn every_camera_has_a_reference_of_its_own() {
     assert_eq!(usage.code, Some(2));
     assert!(usage.stderr.contains("--reference-image"), "{}", usage.stderr);
 }
+
+#[test]
+fn figures_against_glossy_transport_stand_apart() {
+    let rooms = Rooms::new();
+    let (rooms_scene, path) = (scene("two_rooms_open"), rooms.folder.path().join("glossy.exr"));
+    let traced = ["reference", text(&rooms_scene), "-o", text(&path), "--spp", "32", "--size", SIZE, "-q"];
+    succeed(&[&traced[..], &["--transport", "gltf"]].concat());
+    let report = rooms.render("run", &path);
+    for method in report["methods"].as_array().unwrap() {
+        assert!(method["error"].is_null(), "{method}");
+        assert!(number(&method["error_gltf"]["rmse"]) > 0.0);
+    }
+}

@@ -25,7 +25,13 @@ pub enum Source {
     /// Traced for every camera.
     Trace { settings: ReferenceSettings },
     /// One camera's, read from a file.
-    File { path: PathBuf, image: LayeredImage, layers: ReferenceLayers },
+    File(Box<ReferenceFile>),
+}
+
+pub struct ReferenceFile {
+    path: PathBuf,
+    image: LayeredImage,
+    layers: ReferenceLayers,
 }
 
 impl Source {
@@ -40,7 +46,7 @@ impl Source {
         let size = (args.view.size.width, args.view.size.height);
         let layers = ReferenceLayers::new(&image, size, spp_of(&image).map(|spp| spp / BLOCK))
             .with_context(|| format!("--reference-image: cannot compare with {}", path.display()))?;
-        Ok(Some(Source::File { path: path.clone(), image, layers }))
+        Ok(Some(Source::File(Box::new(ReferenceFile { path: path.clone(), image, layers }))))
     }
 }
 
@@ -71,7 +77,8 @@ impl Reference {
         Ok(match &run.reference {
             None => None,
             Some(Source::Trace { settings }) => Some(Reference::trace(run, camera, view, settings)?),
-            Some(Source::File { path, image, layers }) => {
+            Some(Source::File(file)) => {
+                let ReferenceFile { path, image, layers } = &**file;
                 check_file(run, camera, view, path, image)?;
                 let summary = ReferenceSummary { file: Some(path.display().to_string()), ..Default::default() };
                 let summary = ReferenceSummary { spp: spp_of(image), ..summary };

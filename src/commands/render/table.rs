@@ -80,22 +80,28 @@ fn relative_rmse(measured: &Measured, mean: Option<f64>) -> String {
     }
 }
 
+/// Picks one region's figures.
+type Part = fn(&ErrorReport) -> &Measured;
+
 /// What the error is relative to, each region's errors, and what speaks against relying on them.
 fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {
     let Some(reference) = &report.reference else { return Vec::new() };
     let errors: Vec<(&str, &ErrorReport)> =
         report.methods.iter().filter_map(|m| Some((label(m), errors_of(m)?))).collect();
     let Some((_, first)) = errors.first() else { return Vec::new() };
-    let light = format::or_undefined(mean, |e| format::significant(e, 4));
-    let noise = reference.standard_error_mean.zip(mean.filter(|m| *m > 0.0)).map(|(error, mean)| error / mean);
     let glossy = report.methods.iter().any(|m| m.error_gltf.is_some());
     let transport = if glossy { " (glossy, as probes are not)" } else { "" };
-    let mut lines = vec![format!(
-        "error: root mean square difference from the reference{transport} ÷ its mean, {light} W·m⁻²; a pixel of it is known to {} on average",
-        format::or_undefined(noise, format::percent),
-    )];
-    let regions: [(&str, fn(&ErrorReport) -> &Measured); 2] =
-        [("in corners", |e| &e.by_region.corner), ("elsewhere", |e| &e.by_region.flat)];
+    let difference = format!("error: root mean square difference from the reference{transport}");
+    let mut lines = vec![match mean.filter(|mean| *mean > 0.0) {
+        Some(mean) => {
+            let noise = reference.standard_error_mean.map_or_else(String::new, |error| {
+                format!("; a pixel of it is known to {} on average", format::percent(error / mean))
+            });
+            format!("{difference} ÷ its mean, {} W·m⁻²{noise}", format::significant(mean, 4))
+        }
+        None => format!("{difference}, which is black"),
+    }];
+    let regions: [(&str, Part); 2] = [("in corners", |e| &e.by_region.corner), ("elsewhere", |e| &e.by_region.flat)];
     for (name, region) in regions {
         let pixels = region(first).pixels;
         if pixels == 0 {

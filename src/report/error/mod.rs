@@ -14,7 +14,12 @@
 //! | `flip` | mean of LDR-FLIP's map | [`flip`] |
 //!
 //! The peak is the largest value of the reference, as is usual for pictures without a largest possible one.
-//! Standard errors follow from v by the delta method ([`pooled::Pooled`]); pixels are independent.
+//! Standard errors follow from v by the delta method ([`pooled::Pooled`]); pixels are independent. To them comes what the
+//! corrections themselves may be wrong by: a share of b, and relative squares where the noise is as large as what they are
+//! relative to.
+//!
+//! The reference is too noisy for some part of the picture where there Σv > Σ(d² − v): the noise exceeds the difference. Figures
+//! pooled over many pixels may be well determined all the same, which is what their standard errors say.
 
 pub mod flip;
 pub mod pooled;
@@ -27,7 +32,7 @@ use serde::Serialize;
 use super::reference_layers::ReferenceLayers;
 use crate::shade::regions::Region;
 use pooled::{Pooled, Terms};
-use terms::{FOLD_UNCERTAINTY, fold, relative_square};
+use terms::{FOLD_UNCERTAINTY, fold, is_continued, relative_square};
 use window::window_means;
 
 /// ε of `relmse`, as a share of the squared mean of the reference.
@@ -101,6 +106,8 @@ struct Sums {
     square: Pooled,
     relative: Pooled,
     fold: f64,
+    /// Relative squares where the noise is as large as what they are relative to.
+    doubtful: f64,
     noise: f64,
 }
 
@@ -120,14 +127,14 @@ pub fn measure(
     let usable = |i: usize| regions[i].is_some() && irradiance[i].is_finite() && reference.is_finite(i);
     let mask: Vec<bool> = (0..irradiance.len()).map(usable).collect();
     let (epsilon, peak) = scale(reference, &mask);
-    let size = difference_size(reference, irradiance, &mask);
+    let around = look_around(reference, irradiance, &mask);
 
     // The whole picture, corners, flat parts.
     let mut sums = [Sums::default(); 3];
     for i in (0..irradiance.len()).filter(|&i| mask[i]) {
         let part = if regions[i] == Some(Region::Corner) { 1 } else { 2 };
         for s in [0, part] {
-            sums[s].add(reference, i, irradiance[i], size[i], epsilon);
+            sums[s].add(reference, i, irradiance[i], around.as_ref().map(|a| &a[i]), epsilon);
         }
     }
     let finish = |part: usize| {
@@ -158,24 +165,38 @@ fn scale(reference: &ReferenceLayers, mask: &[bool]) -> (f64, f64) {
     (RELATIVE_FLOOR * mean * mean, peak)
 }
 
-/// D² of every pixel and channel: mean of d² − v over the pixels around it.
-fn difference_size(reference: &ReferenceLayers, irradiance: &[Vec3], mask: &[bool]) -> Vec<[f64; 3]> {
-    let Some(noise) = &reference.noise else { return vec![[0.0; 3]; irradiance.len()] };
-    let excess = |i: usize| {
-        let d = (irradiance[i] - reference.irradiance[i]).as_dvec3();
-        [0, 1, 2].map(|c| d[c] * d[c] - noise.between(i, c, c))
+/// What the pixels around one say, per channel.
+#[derive(Debug, Clone, Copy)]
+struct Around {
+    /// Mean of d.
+    difference: [f64; 3],
+    /// Mean of v: that of a pixel is itself an estimate, from few blocks a poor one.
+    variance: [f64; 3],
+    /// Mean of r² − v, an estimate of t².
+    square: [f64; 3],
+}
+
+/// Of every pixel; `None` where the noise is not known.
+fn look_around(reference: &ReferenceLayers, irradiance: &[Vec3], mask: &[bool]) -> Option<Vec<Around>> {
+    let noise = reference.noise.as_ref()?;
+    let values = |i: usize| {
+        let (r, e) = (reference.irradiance[i].as_dvec3(), irradiance[i].as_dvec3());
+        let v = [0, 1, 2].map(|c| noise.between(i, c, c));
+        let (d, t) = (e - r, [0, 1, 2].map(|c| r[c] * r[c] - v[c]));
+        [d.x, d.y, d.z, v[0], v[1], v[2], t[0], t[1], t[2]]
     };
-    window_means(reference.width, reference.height, |i| mask[i], excess)
+    let means = window_means(reference.width, reference.height, |i| mask[i], values);
+    let three = |m: &[f64; 9], from: usize| [m[from], m[from + 1], m[from + 2]];
+    Some(means.iter().map(|m| Around { difference: three(m, 0), variance: three(m, 3), square: three(m, 6) }).collect())
 }
 
 impl Sums {
-    /// `size`: D² per channel.
-    fn add(&mut self, reference: &ReferenceLayers, pixel: usize, value: Vec3, size: [f64; 3], epsilon: f64) {
+    fn add(&mut self, reference: &ReferenceLayers, pixel: usize, value: Vec3, around: Option<&Around>, epsilon: f64) {
         let noise = reference.noise.as_ref().map(|n| (n, pixel));
         let r = reference.irradiance[pixel].to_array().map(f64::from);
         let d = [0, 1, 2].map(|c| f64::from(value[c]) - r[c]);
         let v = [0, 1, 2].map(|c| noise.map_or(0.0, |(n, i)| n.between(i, c, c)));
-        let b = [0, 1, 2].map(|c| fold(size[c], v[c]));
+        let b = [0, 1, 2].map(|c| around.map_or(0.0, |a| fold(d[c], a.difference[c], a.variance[c])));
         let mut add = |to: fn(&mut Sums) -> &mut Pooled, term: &dyn Fn(usize) -> (f64, f64, f64)| {
             let t = [0, 1, 2].map(term);
             let terms = Terms { value: t.map(|t| t.0), first: t.map(|t| t.1), second: t.map(|t| t.2) };
@@ -188,9 +209,16 @@ impl Sums {
         add(|s| &mut s.over, &|c| (d[c].max(0.0) - b[c] / 2.0, -is(d[c] > 0.0), 0.0));
         add(|s| &mut s.under, &|c| ((-d[c]).max(0.0) - b[c] / 2.0, is(d[c] < 0.0), 0.0));
         add(|s| &mut s.square, &|c| (d[c] * d[c] - v[c], -2.0 * d[c], 2.0));
-        add(|s| &mut s.relative, &|c| {
-            if epsilon > 0.0 { relative_square(d[c], r[c], v[c], epsilon) } else { (0.0, 0.0, 0.0) }
-        });
+        if epsilon > 0.0 {
+            add(|s| &mut s.relative, &|c| relative_square(d[c], r[c], v[c], epsilon));
+            for c in 0..3 {
+                let known = around.is_none_or(|a| is_continued(a.variance[c], a.square[c], epsilon));
+                if !known {
+                    let w = r[c] * r[c] + epsilon;
+                    self.doubtful += (d[c] * d[c]).max(v[c]) / w;
+                }
+            }
+        }
         self.pixels += 1;
         self.fold += b.iter().sum::<f64>();
         self.noise += v.iter().sum::<f64>();
@@ -224,7 +252,7 @@ impl Sums {
         let standard_error = Figures {
             mae: error(&self.absolute, folded),
             rmse: known(root_error(rmse, square_error)),
-            relmse: relative(0.0).and(error(&self.relative, 0.0)),
+            relmse: relative(0.0).and(error(&self.relative, self.doubtful / samples)),
             bias: error(&self.bias, 0.0),
             over: error(&self.over, folded / 2.0),
             under: error(&self.under, folded / 2.0),

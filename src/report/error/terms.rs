@@ -5,9 +5,13 @@
 
 use std::f64::consts::{PI, SQRT_2};
 
-/// By how much [`fold`] may be wrong, as a share of itself. It was simulated for D/σ constant from 0 to 3, ramps through 0, steps
-/// and checkerboards, with windows of 5 × 5: what remained of the bias was at most 0.28 of the correction.
+/// By how much [`fold`] may be wrong, as a share of itself. It was simulated for D/σ constant from 0 to 3, ramps through 0 and steps,
+/// and compared with what noise added to pictures of real scenes at 64 and 512 samples per pixel: what remained of the bias was at
+/// most a quarter of the correction.
 pub const FOLD_UNCERTAINTY: f64 = 0.3;
+
+/// Differences of so many deviations are no noise, whatever the pixels around them say.
+const SURE_SIGMAS: f64 = 3.0;
 
 /// Largest variance, as a share of the denominator r² + ε, that [`relative_square`] is continued into the complex plane for:
 /// √(3v) must stay clear of the poles, where 3v = r² + ε.
@@ -16,16 +20,22 @@ const MAX_CONTINUED: f64 = 1.0 / 6.0;
 /// By how much noise of the variance `v` raises the mean of |d| above |D|: the mean of the folded normal distribution
 /// (Leone, Nelson & Nottingham 1961) minus |D|, σ·√(2/π)·exp(−D²/2v) − |D|·erfc(|D|/(σ√2)).
 ///
-/// The true D is not known, and the measured one would not do: it is far from 0 just where D is 0. D² is estimated by the mean
-/// of d² − v over the pixel's neighbourhood, whatever the sign of d there.
-pub fn fold(d_squared: f64, v: f64) -> f64 {
+/// The true D is not known, and the measured one would not do: it is far from 0 just where D is 0. `around`, the mean of d over the
+/// pixel's neighbourhood, stands for it, unless `d` itself is beyond doubt.
+pub fn fold(d: f64, around: f64, v: f64) -> f64 {
     if v <= 0.0 {
         return 0.0;
     }
-    let (size, sigma) = (d_squared.max(0.0).sqrt(), v.sqrt());
+    let sure = d * d > SURE_SIGMAS * SURE_SIGMAS * v;
+    let (size, sigma) = (if sure { d.abs() } else { around.abs() }, v.sqrt());
     let raised =
         sigma * (2.0 / PI).sqrt() * (-size * size / (2.0 * v)).exp() - size * libm::erfc(size / (sigma * SQRT_2));
     raised.max(0.0)
+}
+
+/// Whether [`relative_square`] knows its denominator t² + ε, with estimates of v and t² from the pixels around.
+pub fn is_continued(v: f64, t_squared: f64, epsilon: f64) -> bool {
+    v <= MAX_CONTINUED * (t_squared.max(0.0) + epsilon)
 }
 
 /// d²/(r² + ε) and its first two derivatives in r, the value freed from noise in numerator and denominator.
@@ -64,9 +74,11 @@ mod tests {
     fn the_fold_is_what_noise_adds() {
         for (d, v) in [(0.0, 1.0), (0.3, 0.04), (-1.0, 0.5), (2.0, 1.0), (5.0, 0.1)] {
             let raised = expected(v, |n| f64::abs(d - n)) - d.abs();
-            assert!((fold(d * d, v) - raised).abs() < 1e-5, "{d} {v}: {} {raised}", fold(d * d, v));
+            assert!((fold(0.0, d, v) - raised).abs() < 1e-5, "{d} {v}: {} {raised}", fold(0.0, d, v));
         }
-        assert_eq!(fold(1.0, 0.0), 0.0);
+        assert_eq!(fold(1.0, 1.0, 0.0), 0.0);
+        // Ten deviations among zeros are no noise.
+        assert!(fold(10.0, 0.0, 1.0) < 1e-20);
     }
 
     #[test]

@@ -305,7 +305,7 @@ fn flip_takes_the_references_noise_away() {
             let Flip { mean: Some(mean), standard_error: Some(error) } = of(&noisy, &pair.method) else {
                 panic!("no figure")
             };
-            // The greater part of the error is systematic, and at most 0.8 of itself in simulations.
+            // The greater part of the error is systematic: no significance level belongs to it, and two is what these need.
             assert!((mean - exact_mean).abs() <= 2.0 * error, "seed {seed}: {mean} ± {error} instead of {exact_mean}");
             assert!(error < 0.02, "seed {seed}: {error}");
             let uncorrected = of(&layers(&noisy.irradiance, None, None, None), &pair.method).mean.expect("a mean");

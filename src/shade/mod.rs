@@ -1,5 +1,6 @@
 //! Cameras to pictures: what is seen, how probes light it, and the layers that come of it.
 
+mod develop;
 pub mod film;
 pub mod framing;
 pub mod layers;

@@ -5,8 +5,9 @@
 
 use std::path::{Path, PathBuf};
 
+use super::develop::quantities;
 use super::film::{Film, Noise};
-use super::reference::{Reference, ReferenceSettings, State, quantities};
+use super::reference::{Reference, ReferenceSettings, State};
 use crate::image::{ImageError, LayeredImage};
 use crate::light::World;
 use crate::light::sampled::RayCount;

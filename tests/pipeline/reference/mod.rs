@@ -1,9 +1,12 @@
 //! The path tracer against formulas, and its file.
 //!
 //! Every comparison is of a whole small picture with a formula ([`Check`]): per channel the mean difference must lie within
-//! three standard errors (chance 2.7e-3 each, if all is right), and each pixel's within six (2e-9). Seeds are fixed, so
-//! the outcome is; with a new seed some of the about 260 comparisons of means here, whose channels mostly share their
-//! random numbers, would fail with a probability near 1/4 (90 independent ones × 2.7e-3).
+//! three standard errors (2.7e-3 of a normal distribution lies outside), and each pixel's within six, which only guards
+//! against a place that is wrong by itself: the tails of single pixels are not normal.
+//!
+//! There are 90 checks of three channels each, 270 comparisons of means. Channels share their random numbers, so that 90 of
+//! them tell something new at most: with a new seed one or more would fail with a probability of about 0.2, and of 0.5
+//! were all 270 independent. Seeds are fixed, so the outcome is.
 
 mod blended;
 mod furnace;

@@ -39,6 +39,15 @@ pub enum Command {
     Bake(BakeArgs),
     /// Shade a picture of the scene with probes, without and with visibility, and report leaks, times and bytes.
     Render(RenderArgs),
+    /// Path-trace a picture of the scene: the truth that probes are compared with.
+    ///
+    /// Every surface is lit by paths of any length, on the same geometry, lights and materials as in `bake` and
+    /// `render`, through the same pixel centres, so that pictures subtract. The file has the layers of `render`'s
+    /// pictures and, from 32 samples per pixel on, `beauty_variance` and `irradiance_indirect_variance`: the variance of
+    /// each pixel's mean. It also carries its own state, so that --resume can add samples later.
+    ///
+    /// Progress is saved to FILE.exr every minute.
+    Reference(ReferenceArgs),
     /// Print what a probe file holds, and check its hashes.
     Inspect(InspectArgs),
 }
@@ -57,6 +66,34 @@ pub struct TraceArgs {
     pub threads: usize,
 }
 
+/// Flags that choose a configuration.
+#[derive(Debug, Args)]
+pub struct ConfigArgs {
+    /// Configuration file.
+    #[arg(long, value_name = "FILE.ron", conflicts_with = "preset")]
+    pub config: Option<PathBuf>,
+    /// Built-in configuration; `list` prints their names.
+    #[arg(long, value_name = "NAME|list")]
+    pub preset: Option<String>,
+    /// Override one key of the configuration, for example grid.spacing_m=0.5; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+}
+
+/// Flags of every command that makes a picture.
+#[derive(Debug, Args)]
+pub struct ViewArgs {
+    /// Camera of the scene by name or number, the first where not given; `render` takes `all` (a subfolder each).
+    #[arg(long, value_name = "NAME|INDEX|all", conflicts_with = "look_at", allow_negative_numbers = true)]
+    pub camera: Option<String>,
+    /// Camera by origin and target, metres in world space, and vertical field of view in degrees (60 where not given).
+    #[arg(long, value_name = "ox,oy,oz,tx,ty,tz[,fov]", value_parser = LookAt::from_str, allow_hyphen_values = true)]
+    pub look_at: Option<LookAt>,
+    /// Size of the pictures in pixels.
+    #[arg(long, value_name = "WxH", default_value = "640x360", value_parser = Size::from_str, allow_hyphen_values = true)]
+    pub size: Size,
+}
+
 #[derive(Debug, Args)]
 pub struct BakeArgs {
     /// Scene: a .glb or .gltf file.
@@ -67,15 +104,8 @@ pub struct BakeArgs {
     /// Probe file to write.
     #[arg(short, long, value_name = "OUT.probes", required_unless_present_any = ["dry_run", "print_config", "preset"])]
     pub output: Option<PathBuf>,
-    /// Configuration file.
-    #[arg(long, value_name = "FILE.ron", conflicts_with = "preset")]
-    pub config: Option<PathBuf>,
-    /// Built-in configuration; `list` prints their names.
-    #[arg(long, value_name = "NAME|list")]
-    pub preset: Option<String>,
-    /// Override one key of the configuration, for example grid.spacing_m=0.5; may be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
+    #[command(flatten)]
+    pub config: ConfigArgs,
     /// Also write the report to this file.
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,
@@ -110,21 +140,72 @@ pub struct RenderArgs {
     /// Folder for pictures and report; created where missing.
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Camera of the scene by name or number, or `all` (a subfolder each); the first where not given.
-    #[arg(long, value_name = "NAME|INDEX|all", conflicts_with = "look_at", allow_negative_numbers = true)]
-    pub camera: Option<String>,
-    /// Camera by origin and target, metres in world space, and vertical field of view in degrees (60 where not given).
-    #[arg(long, value_name = "ox,oy,oz,tx,ty,tz[,fov]", value_parser = LookAt::from_str, allow_hyphen_values = true)]
-    pub look_at: Option<LookAt>,
-    /// Size of the pictures in pixels.
-    #[arg(long, value_name = "WxH", default_value = "640x360", value_parser = Size::from_str, allow_hyphen_values = true)]
-    pub size: Size,
+    #[command(flatten)]
+    pub view: ViewArgs,
     /// Exposure of the PNG pictures, in powers of two; from the picture where not given.
     #[arg(long, value_name = "EV", allow_hyphen_values = true, value_parser = parse_exposure)]
     pub exposure: Option<f32>,
+    /// Path-trace a reference of every camera with so many samples per pixel, and report how far the probes are from it.
+    ///
+    /// Rounded up to a multiple of 16; from 32 on figures have standard errors.
+    #[arg(long, value_name = "SPP", allow_negative_numbers = true, conflicts_with = "reference_image", value_parser = clap::value_parser!(u32).range(1..=MAX_SPP))]
+    pub reference: Option<u32>,
+    /// The same with a reference that is there: of this camera and size, as `reference` or --reference wrote it.
+    #[arg(long, value_name = "FILE.exr")]
+    pub reference_image: Option<PathBuf>,
     /// Render although the scene has changed since the bake.
     #[arg(long)]
     pub allow_scene_change: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct ReferenceArgs {
+    /// Scene: a .glb or .gltf file.
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    #[command(flatten)]
+    pub trace: TraceArgs,
+    /// Picture to write, in layers.
+    #[arg(short, long, value_name = "FILE.exr")]
+    pub output: PathBuf,
+    /// Samples per pixel in all, those of a resumed file included. Rounded up to a multiple of 16; 1 to 15 are taken as
+    /// they are, for a quick look without a known error.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=MAX_SPP))]
+    pub spp: u32,
+    /// Reflection: `lambert` as in probes, every surface diffuse; `gltf` with the glossy lobes of metallic-roughness
+    /// materials, in a layer `glossy` too.
+    #[arg(long, value_enum, default_value = "lambert")]
+    pub transport: TransportName,
+    #[command(flatten)]
+    pub view: ViewArgs,
+    /// Most reflections between a light and the surface in the picture; all where not given. 0 leaves light that comes
+    /// straight from emitters and the sky.
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub max_bounces: Option<u32>,
+    /// Scale samples down that bring more irradiance than this, W·m⁻²: hides rare bright pixels, and makes the picture
+    /// too dark. Off where not given.
+    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = parse_positive)]
+    pub firefly_clamp: Option<f32>,
+    /// Continue FILE.exr, made of the same scene with the same arguments, up to --spp samples: the result is that of one
+    /// run. Without the file it begins anew.
+    #[arg(long)]
+    pub resume: bool,
+    /// Also write the report to this file.
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Of the configuration `lights` and `solver.albedo_max` count.
+    #[command(flatten)]
+    pub config: ConfigArgs,
+}
+
+/// Most samples per pixel: their sum is far from losing a sample to f64, and years from being reached.
+const MAX_SPP: i64 = 1 << 30;
+
+/// Models of reflection by the names of the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum TransportName {
+    Lambert,
+    Gltf,
 }
 
 #[derive(Debug, Args)]
@@ -193,6 +274,11 @@ impl FromStr for LookAt {
 fn parse_exposure(text: &str) -> Result<f32, String> {
     let ev: Option<f32> = text.parse().ok().filter(|ev: &f32| ev.abs() <= 100.0);
     ev.ok_or_else(|| "write a number from -100 to 100".into())
+}
+
+fn parse_positive(text: &str) -> Result<f32, String> {
+    let number: Option<f32> = text.parse().ok().filter(|x: &f32| x.is_finite() && *x > 0.0);
+    number.ok_or_else(|| "write a positive number".into())
 }
 
 fn parse_size(text: &str) -> Result<u64, String> {

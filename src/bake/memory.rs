@@ -4,9 +4,10 @@
 use crate::config::Config;
 use crate::memory::{TooLittleMemory, available_bytes};
 use crate::probe::Grid;
-use crate::probe::capture::{ProbeCapture, Surfel};
+use crate::probe::capture::ProbeCapture;
 use crate::probe::filter::{FilterSettings, Kernel};
 use crate::probe::query::VisibilitySettings;
+use crate::probe::surfel::Surfel;
 use crate::probe::survey;
 use crate::scene::Mesh;
 

@@ -6,7 +6,9 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use glam::DVec3;
 
-use super::{Console, check_apart_from, inputs, load_scene, peak_memory_bytes, set_threads, tell, write_json};
+use super::{
+    Console, check_apart_from, inputs, load_scene, peak_memory_bytes, resolve_config, set_threads, tell, write_json,
+};
 use crate::bake::{Baked, Checkpoint, Circumstances, Prepared, prepare};
 use crate::cli::BakeArgs;
 use crate::config::{Config, presets};
@@ -18,20 +20,21 @@ use crate::probe::file::SceneRecord;
 use crate::probe::layout;
 use crate::report::bake::{BakeReport, BytesPerProbe, SCHEMA};
 use crate::report::format;
+use crate::report::header::Header;
 use crate::report::table::{Column, Table};
-use crate::scene::{EnvironmentSource, Scene};
+use crate::scene::Scene;
 
 pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
-    if args.preset.as_deref() == Some("list") {
+    if args.config.preset.as_deref() == Some("list") {
         return list_presets(console);
     }
-    let config = resolve_config(args)?;
+    let config = resolve_config(&args.config, &args.trace)?;
     if args.print_config {
         return console.print(&config.to_ron());
     }
     let path = args.scene.as_deref().context("no scene: give a .glb or .gltf file")?;
     let outputs = outputs(args)?;
-    let config_file = args.config.as_ref().map(|file| Named::new("the configuration", file));
+    let config_file = args.config.config.as_ref().map(|file| Named::new("the configuration", file));
     check_outputs(&outputs, &inputs(path, &args.trace, config_file))?;
     let threads = set_threads(args.trace.threads)?;
 
@@ -115,30 +118,13 @@ fn list_presets(console: &Console) -> Result<()> {
     console.print(&lines.join("\n"))
 }
 
-/// Defaults, then preset or file, then `--set`, then a constant `--env`, which the probe file so carries to `render`.
-fn resolve_config(args: &BakeArgs) -> Result<Config> {
-    let mut config = match (&args.config, &args.preset) {
-        (Some(path), _) => Config::load(path)?,
-        (None, Some(name)) => presets::find(name)?,
-        (None, None) => Config::default(),
-    };
-    config = config.with_overrides(&args.set)?;
-    match &args.trace.env {
-        Some(EnvironmentSource::Constant(sky)) => config.lights.sky = Some((*sky).into()),
-        // A map replaces the configured sky; its path has no place in the file.
-        Some(EnvironmentSource::File(_)) => config.lights.sky = None,
-        None => {}
-    }
-    Ok(config)
-}
-
 /// Where the configuration in effect comes from.
 fn origin_of(args: &BakeArgs) -> String {
-    let base = match (&args.config, &args.preset) {
+    let base = match (&args.config.config, &args.config.preset) {
         (Some(path), _) => path.display().to_string(),
         (None, preset) => format!("preset {}", preset.as_deref().unwrap_or("default")),
     };
-    args.set.iter().fold(base, |text, set| format!("{text}, --set {set}"))
+    args.config.set.iter().fold(base, |text, set| format!("{text}, --set {set}"))
 }
 
 /// Probes away from the scene can be meant, for a plain below them; more often a unit or an axis is wrong.
@@ -224,13 +210,7 @@ fn report(
         probes,
     );
     BakeReport {
-        schema: SCHEMA,
-        version: env!("CARGO_PKG_VERSION"),
-        command: "bake",
-        seed,
-        threads,
-        scene_blake3: scene.blake3.clone(),
-        config: config.to_ron(),
+        header: Header::new(SCHEMA, "bake", seed, threads, &scene.blake3, config.to_ron()),
         probes,
         probes_active: baked.volume.active_count(),
         rays: baked.rays,

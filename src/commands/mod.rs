@@ -1,7 +1,9 @@
 //! One file a subcommand. Here errors become one line and an exit code.
 
 pub mod bake;
+mod camera;
 pub mod inspect;
+pub mod reference;
 pub mod render;
 mod tell;
 
@@ -10,8 +12,8 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 
-use crate::cli::{Cli, Command, OutputFlags, TraceArgs};
-use crate::config::Config;
+use crate::cli::{Cli, Command, ConfigArgs, OutputFlags, TraceArgs};
+use crate::config::{Config, presets};
 use crate::output::{Named, check_apart, write_atomically};
 use crate::progress::Progress;
 use crate::scene::{self, EnvironmentSource, LoadOptions, Scene};
@@ -58,6 +60,7 @@ pub fn run(cli: Cli) -> Result<()> {
     match cli.command {
         Command::Bake(args) => bake::run(&args, &console),
         Command::Render(args) => render::run(&args, &console),
+        Command::Reference(args) => reference::run(&args, &console),
         Command::Inspect(args) => inspect::run(&args, &console),
     }
 }
@@ -86,6 +89,23 @@ fn inputs(scene: &Path, trace: &TraceArgs, others: impl IntoIterator<Item = Name
 fn check_apart_from(scene: &Scene, outputs: &[Named]) -> Result<()> {
     let files: Vec<Named> = scene.files.iter().map(|file| Named::new("a file of the scene", file)).collect();
     Ok(check_apart(outputs, &files)?)
+}
+
+/// Defaults, then preset or file, then `--set`, then a constant `--env`, which a probe file so carries to `render`.
+fn resolve_config(args: &ConfigArgs, trace: &TraceArgs) -> Result<Config> {
+    let mut config = match (&args.config, &args.preset) {
+        (Some(path), _) => Config::load(path)?,
+        (None, Some(name)) => presets::find(name)?,
+        (None, None) => Config::default(),
+    };
+    config = config.with_overrides(&args.set)?;
+    match &trace.env {
+        Some(EnvironmentSource::Constant(sky)) => config.lights.sky = Some((*sky).into()),
+        // A map replaces the configured sky; its path has no place in the file.
+        Some(EnvironmentSource::File(_)) => config.lights.sky = None,
+        None => {}
+    }
+    Ok(config)
 }
 
 /// Loads a scene with the sky from the command line, else from the configuration, and passes its warnings on.

@@ -1,44 +1,42 @@
 //! `lightprobe render`: scene + probes → pictures and report.
 
 mod check;
+mod pictures;
+mod reference;
+mod table;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
-use glam::{DVec3, Vec3};
+use anyhow::{Result, bail};
+use glam::Vec3;
 
-use self::check::{PICTURES, check_pictures, check_view, pictures};
+use self::check::{check_pictures, check_view, pictures};
+use self::reference::{Reference, Source};
+use super::camera::cameras;
 use super::{Console, check_apart_from, inputs, load_scene, peak_memory_bytes, set_threads, tell, write_json};
-use crate::cli::{LookAt, RenderArgs};
+use crate::cli::RenderArgs;
 use crate::config::Config;
-use crate::image::{LayeredImage, Picture8};
+use crate::image::LayeredImage;
 use crate::light::World;
 use crate::math::color::luminance;
 use crate::output::{Named, create_folder};
 use crate::probe::file::{self, ProbeFile};
 use crate::probe::query::{Query, VisibilitySettings};
+use crate::probe::truth::Truth;
 use crate::probe::{Volume, layout};
-use crate::report::colormap::Scale;
-use crate::report::format;
-use crate::report::heatmap::{Heatmap, range_of};
-use crate::report::leak;
-use crate::report::probe_key::{Entry, with_key};
+use crate::report::baked::{self, BakedReport};
+use crate::report::header::Header;
 use crate::report::render::{MethodReport, RenderReport, RenderTimes, SCHEMA, Spread};
-use crate::report::table::{Column, Table};
+use crate::report::{error, leak};
 use crate::scene::{Camera, Scene};
-use crate::shade::framing::frame;
-use crate::shade::layers::{compose, to_pixels};
+use crate::shade::layers::compose;
 use crate::shade::methods::{Method, exact_masks, irradiance, time_lookup, time_shading};
 use crate::shade::points::{View, see};
-use crate::shade::spheres;
+use crate::shade::reference::ReferenceSettings;
 
-/// What the colours in `probes.png` mean.
-const PROBE_KEY: &[Entry] = &[
-    Entry { color: [40, 40, 40], rim: spheres::RIM_COLOR, meaning: "probe, a white sphere in its own light" },
-    Entry { color: spheres::INSIDE_COLOR, rim: spheres::RIM_COLOR, meaning: "inside geometry" },
-    Entry { color: spheres::UNSAMPLED_COLOR, rim: spheres::RIM_COLOR, meaning: "never sampled" },
-];
+/// Name in the report of probes lit by full paths, with exact visibility.
+pub const PATH_RAY: &str = "path_ray";
 
 /// What all cameras of a run share.
 struct Run<'a> {
@@ -49,9 +47,33 @@ struct Run<'a> {
     volume: &'a Volume,
     bytes_per_probe: f64,
     scene_changed: bool,
+    reference: Option<Source>,
+    truth: Option<BakedTruth>,
     threads: usize,
     times: RenderTimes,
     started: Instant,
+}
+
+/// The file's probes lit by full paths, and how the file's own differ from them.
+struct BakedTruth {
+    truth: Truth,
+    report: BakedReport,
+}
+
+impl BakedTruth {
+    /// Hits are many, and each path that leaves one is a sample of its own: few from each do.
+    const REFERENCE_SPP_PER_PATH: u32 = 128;
+
+    /// With a traced reference, and in proportion to its samples.
+    fn trace(world: &World, config: &Config, volume: &Volume, settings: &ReferenceSettings, console: &Console) -> Self {
+        let started = Instant::now();
+        let paths = (settings.spp / Self::REFERENCE_SPP_PER_PATH).max(1);
+        let truth = Truth::trace(world, &config.capture, volume, paths, settings.seed, console.progress);
+        let (figures, standard_error) = baked::measure(volume, &truth);
+        let paths_per_hit = u64::from(paths) * truth.runs.len() as u64;
+        let report = BakedReport { figures, standard_error, paths_per_hit, time_s: started.elapsed().as_secs_f64() };
+        BakedTruth { truth, report }
+    }
 }
 
 /// One method's results.
@@ -65,8 +87,9 @@ struct Shaded {
 pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
     let started = Instant::now();
     let inputs = inputs(&args.scene, &args.trace, [Named::new("the probe file", &args.probes)]);
-    check_pictures(&args.output, &inputs)?;
+    check_pictures(args, &args.output, &inputs)?;
     let threads = set_threads(args.trace.threads)?;
+    let reference = Source::of(args)?;
     let probes = file::read(&args.probes)?;
     let config = Config::parse(&probes.config, &format!("{}: its configuration", args.probes.display()))?;
     let scene = load_scene(&args.scene, &args.trace, &config, console)?;
@@ -82,7 +105,23 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
 
     let volume = volume_as_planned(&probes, &scene);
     let bytes_per_probe = runtime_bytes(&probes, &config);
-    let cameras = cameras(args, &world, console)?;
+    let cameras = cameras(&args.view, &world, console)?;
+    if args.reference_image.is_some() && cameras.len() > 1 {
+        bail!("--reference-image is of one camera and --camera all asks for {}; name one", cameras.len());
+    }
+    let folder = |camera: &Camera| match args.view.camera.as_deref() {
+        Some("all") => args.output.join(folder_name(&camera.name)),
+        _ => args.output.clone(),
+    };
+    for camera in &cameras {
+        check_pictures(args, &folder(camera), &inputs)?;
+        check_apart_from(&scene, &pictures(args, &folder(camera)))?;
+        check_view(args, &world, camera, console)?;
+    }
+    let truth = match &reference {
+        Some(Source::Trace { settings }) => Some(BakedTruth::trace(&world, &config, &volume, settings, console)),
+        _ => None,
+    };
     let run = Run {
         args,
         console,
@@ -91,19 +130,12 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
         volume: &volume,
         bytes_per_probe,
         scene_changed,
+        reference,
+        truth,
         threads,
         times,
         started,
     };
-    let folder = |camera: &Camera| match args.camera.as_deref() {
-        Some("all") => args.output.join(folder_name(&camera.name)),
-        _ => args.output.clone(),
-    };
-    for camera in &cameras {
-        check_pictures(&folder(camera), &inputs)?;
-        check_apart_from(&scene, &pictures(&folder(camera)))?;
-        check_view(args, &world, camera, console)?;
-    }
     let mut reports = Vec::new();
     for camera in &cameras {
         reports.push(render_camera(&run, camera, &folder(camera))?);
@@ -117,7 +149,7 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
         return console.print(&json);
     }
     for report in &reports {
-        console.print(&table(report))?;
+        console.print(&table::table(report))?;
     }
     console.print(&format!("wrote {}", args.output.display()))
 }
@@ -161,40 +193,6 @@ fn runtime_bytes(probes: &ProbeFile, config: &Config) -> f64 {
         + layout::visibility_bytes(visibility, &config.filter, &config.encoding, surface, count)
 }
 
-/// The cameras that the arguments ask for.
-fn cameras(args: &RenderArgs, world: &World, console: &Console) -> Result<Vec<Camera>> {
-    let scene = world.scene;
-    if let Some(LookAt { origin, target, fov_y_deg }) = args.look_at {
-        let local = |p: [f64; 3]| (DVec3::from(p) - scene.origin_world).as_vec3();
-        return Ok(vec![Camera::look_at("look-at", local(origin), local(target), fov_y_deg.to_radians())]);
-    }
-    let known = || scene.cameras.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ");
-    match args.camera.as_deref() {
-        Some(name) if !scene.cameras.is_empty() || (name != "all" && name != "0") => {
-            if name == "all" {
-                return Ok(scene.cameras.clone());
-            }
-            let by_index = || name.parse::<usize>().ok().and_then(|i| scene.cameras.get(i));
-            let camera = scene.cameras.iter().find(|c| c.name == name).or_else(by_index);
-            let camera = camera.with_context(|| match scene.cameras.len() {
-                0 => format!("--camera {name}: the scene has no cameras; leave it out or use --look-at"),
-                n => format!("--camera {name}: the scene has the cameras {} (numbers 0 to {})", known(), n - 1),
-            })?;
-            Ok(vec![camera.clone()])
-        }
-        _ => Ok(vec![match scene.cameras.first() {
-            Some(camera) => camera.clone(),
-            None => {
-                let bounds = scene.mesh.bounds().unwrap_or((Vec3::NEG_ONE, Vec3::ONE));
-                let (camera, inside) = frame(world, bounds);
-                let from = if inside { "from inside" } else { "from outside" };
-                console.warn(format!("the scene has no camera: framed it {from}; use --look-at for another view"));
-                camera
-            }
-        }]),
-    }
-}
-
 /// A camera's name as the name of a folder.
 fn folder_name(camera: &str) -> String {
     let safe = |c: char| if c.is_alphanumeric() || matches!(c, '-' | '_' | '#' | ' ') { c } else { '_' };
@@ -206,7 +204,7 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
     let query = Query { volume, settings: &run.config.query };
     let bar = run.console.progress.stage("rendering", 2 + Method::ALL.len());
     let primary_started = Instant::now();
-    let view = see(run.world, camera, args.size.width, args.size.height, args.trace.seed);
+    let view = see(run.world, camera, args.view.size.width, args.view.size.height, args.trace.seed);
     let primary_s = primary_started.elapsed().as_secs_f64();
     bar.inc(1);
     let masks_started = Instant::now();
@@ -226,24 +224,52 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
             bytes_per_probe: run.bytes_per_probe,
             irradiance_indirect_mean: mean_luminance(&view, &irradiance),
             leak: leak::measure(&query, &view.points, &masks, method, &irradiance, &exact),
+            error: None,
+            error_gltf: None,
         };
         bar.inc(1);
         Shaded { method, image: compose(&view, &irradiance), irradiance, report }
     };
-    let shaded = Method::ALL.map(shade);
+    let mut shaded = Method::ALL.map(shade);
+    // What is left of the error when the probes are right and visibility exact comes from interpolation between probes.
+    let mut path_traced = run.truth.as_ref().map(|BakedTruth { truth, .. }| {
+        let query = Query { volume: &truth.volume, settings: &run.config.query };
+        let irradiance = irradiance(&query, &view.points, &masks, Method::Ray);
+        let report = MethodReport {
+            name: PATH_RAY,
+            irradiance_indirect_mean: mean_luminance(&view, &irradiance),
+            leak: leak::measure(&query, &view.points, &masks, Method::Ray, &irradiance, &irradiance),
+            ..shaded[2].report.clone()
+        };
+        Shaded { method: Method::Ray, image: compose(&view, &irradiance), irradiance, report }
+    });
+    let baked = run.truth.as_ref().map(|t| t.report.clone());
+    for s in &mut shaded {
+        s.report.leak.baked = baked.as_ref().and_then(|b| b.figures.light);
+    }
     bar.finish_and_clear();
+    let reference = Reference::obtain(run, camera, &view)?;
 
-    let exposure_ev = args.exposure.unwrap_or_else(|| exposure(&shaded[2]));
+    let exposure_ev = args.exposure.unwrap_or_else(|| exposure(&shaded[2], reference.as_ref()));
+    if let Some(reference) = &reference {
+        let bar = run.console.progress.stage("comparing", Method::ALL.len());
+        for s in shaded.iter_mut().chain(&mut path_traced) {
+            compare(s, reference, exposure_ev, args.trace.seed);
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+    }
     create_folder(folder)?;
-    write_pictures(run, camera, &view, &shaded, exposure_ev, folder)?;
+    pictures::write(run, camera, &view, &shaded, reference.as_ref(), exposure_ev, folder)?;
     let report = RenderReport {
-        schema: SCHEMA,
-        version: env!("CARGO_PKG_VERSION"),
-        command: "render",
-        seed: args.trace.seed,
-        threads: run.threads,
-        scene_blake3: run.world.scene.blake3.clone(),
-        config: run.config.to_ron(),
+        header: Header::new(
+            SCHEMA,
+            "render",
+            args.trace.seed,
+            run.threads,
+            &run.world.scene.blake3,
+            run.config.to_ron(),
+        ),
         scene_changed: run.scene_changed,
         camera: camera.name.clone(),
         width: view.width,
@@ -254,11 +280,13 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
         probes_active: volume.active_count(),
         time_s: RenderTimes { primary: primary_s, total: run.started.elapsed().as_secs_f64(), ..run.times },
         peak_memory_bytes: peak_memory_bytes(),
-        methods: shaded.into_iter().map(|s| s.report).collect(),
+        reference: reference.map(|r| r.summary),
+        baked,
+        methods: shaded.into_iter().chain(path_traced).map(|s| s.report).collect(),
     };
     write_json(&folder.join("report.json"), &report)?;
     tell::rendered(run.console, &report);
-    PICTURES.iter().for_each(|name| tell::written(run.console, &folder.join(name)));
+    pictures(args, folder).iter().for_each(|picture| tell::written(run.console, &picture.path));
     Ok(report)
 }
 
@@ -269,106 +297,23 @@ fn mean_luminance(view: &View, irradiance: &[Vec3]) -> Option<f64> {
     (weight > 0.0).then(|| sum / weight)
 }
 
-/// Exposure of the whole run: that of the picture with exact visibility.
-fn exposure(shaded: &Shaded) -> f32 {
-    shaded.image.picture("beauty").map_or(0.0, |p| p.auto_exposure_ev())
+/// Exposure of the whole run: that of the reference, else of the picture with exact visibility.
+fn exposure(exact: &Shaded, reference: Option<&Reference>) -> f32 {
+    let own = || exact.image.picture("beauty").map_or(0.0, |p| p.auto_exposure_ev());
+    reference.map_or_else(own, |r| r.layers.beauty.auto_exposure_ev())
 }
 
-fn write_pictures(
-    run: &Run,
-    camera: &Camera,
-    view: &View,
-    shaded: &[Shaded; 3],
-    exposure_ev: f32,
-    folder: &Path,
-) -> Result<()> {
-    let file = |name: &str, extension: &str| -> PathBuf { folder.join(format!("{name}.{extension}")) };
-    let tonemapped = |image: &LayeredImage| match image.picture("beauty") {
-        Some(picture) => picture.tonemapped(exposure_ev),
-        None => Picture8::filled(view.width, view.height, [0; 3]),
-    };
-    for s in shaded {
-        s.image.write_exr(&file(s.method.name(), "exr"))?;
-        tonemapped(&s.image).write_png(&file(s.method.name(), "png"))?;
+/// Adds the figures that need a reference to a method's report.
+fn compare(shaded: &mut Shaded, reference: &Reference, exposure_ev: f32, seed: u64) {
+    let Reference { layers, regions, .. } = reference;
+    let irradiance = shaded.image.layer("irradiance_indirect").unwrap_or_default();
+    let flips = shaded.image.picture("beauty").map(|p| error::flip::measure(layers, &p, exposure_ev, regions, seed));
+    let error = Some(error::measure(layers, irradiance, regions, flips.as_ref()));
+    if reference.glossy {
+        shaded.report.error_gltf = error;
+    } else {
+        shaded.report.error = error;
     }
-    let [off, on, exact] = shaded;
-    let difference = |s: &Shaded| {
-        let signed = |i: usize| Vec3::splat(luminance(s.irradiance[i]) - luminance(exact.irradiance[i]));
-        to_pixels(view, |i, _| signed(i))
-    };
-    let (off_leak, on_leak) = (difference(off), difference(on));
-    let mut image = LayeredImage::new(view.width, view.height);
-    image.push("leak_on", on_leak.clone());
-    image.push("leak_off", off_leak.clone());
-    image.write_exr(&file("leak", "exr"))?;
-    leak_map(view, &off_leak, &on_leak).write_png(&file("leak", "png"))?;
-    let probes = spheres::draw(&tonemapped(&exact.image), view, camera, run.volume, exposure_ev);
-    with_key(&probes, PROBE_KEY).write_png(&file("probes", "png"))?;
-    Ok(())
-}
-
-/// Both signed differences side by side under one scale: without visibility on the left, with it on the right.
-fn leak_map(view: &View, off: &[Vec3], on: &[Vec3]) -> Picture8 {
-    let mut has_surface = vec![false; off.len()];
-    view.points.iter().for_each(|p| has_surface[p.pixel as usize] = true);
-    let width = view.width as usize;
-    let mut values = Vec::with_capacity(2 * off.len());
-    for row in 0..view.height as usize {
-        for half in [off, on] {
-            let pixels = row * width..(row + 1) * width;
-            values.extend(pixels.map(|i| if has_surface[i] { half[i].x } else { f32::NAN }));
-        }
-    }
-    Heatmap {
-        values: &values,
-        width: 2 * view.width,
-        height: view.height,
-        range: range_of(&values, Scale::Diverging),
-        scale: Scale::Diverging,
-        title: "irradiance against exact visibility: left without, right with visibility",
-        unit: "W·m⁻²",
-        missing: "no surface",
-    }
-    .draw()
-    .picture
-}
-
-fn table(report: &RenderReport) -> String {
-    let mut table = Table::new(&[
-        ("method", Column::Text),
-        ("visibility", Column::Text),
-        ("shade", Column::Number),
-        ("rays", Column::Number),
-        ("look-up", Column::Number),
-        ("memory per probe", Column::Number),
-        ("leak light", Column::Number),
-        ("leak dark", Column::Number),
-        ("hidden share", Column::Number),
-        ("irradiance", Column::Number),
-        ("error", Column::Number),
-    ]);
-    let percent = |share: Option<f64>| share.map_or(format::UNDEFINED.to_owned(), format::percent);
-    for method in &report.methods {
-        table.push([
-            "probes".to_owned(),
-            method.name.trim_start_matches("visibility_").to_owned(),
-            format::seconds(method.shade_ms.median / 1e3),
-            format::seconds(method.ray_ms / 1e3),
-            method.lookup_ns.map_or(format::UNDEFINED.to_owned(), |ns| format::seconds(ns / 1e9)),
-            format::bytes(method.bytes_per_probe.round() as u64),
-            percent(method.leak.light),
-            percent(method.leak.dark),
-            percent(method.leak.fraction),
-            method.irradiance_indirect_mean.map_or(format::UNDEFINED.to_owned(), |e| format::significant(e, 4)),
-            format::UNDEFINED.to_owned(),
-        ]);
-    }
-    format!(
-        "camera {}, {}×{}, exposure {:+.2} EV, {} of the points see no probe\n{table}",
-        report.camera,
-        report.width,
-        report.height,
-        report.exposure_ev,
-        format::percent(report.methods.first().map_or(0.0, |m| m.leak.unseen)),
-    )
+    let shown: Vec<bool> = regions.iter().map(Option::is_some).collect();
+    shaded.report.leak.dark_region = leak::dark_region(irradiance, layers, &shown);
 }

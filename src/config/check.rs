@@ -1,6 +1,7 @@
 //! What values a configuration may have. Every number is held against its range here, NaN and infinities included.
 
 use super::{Config, ConfigError};
+use crate::probe::capture::ReflectedLight;
 use crate::probe::grid::Bounds;
 use crate::probe::query::{DirectionWeight, VisibilitySettings};
 use crate::probe::surface_visibility::MAX_VOXELS_PER_CELL;
@@ -51,6 +52,10 @@ impl Config {
         rule("capture.samples_per_texel", samples.to_string(), (1..=65_536).contains(&samples), "use 1 to 65536");
         let emitter = c.emitter_samples;
         rule("capture.emitter_samples", emitter.to_string(), (1..=65_536).contains(&emitter), "use 1 to 65536");
+        if let ReflectedLight::PathTraced { paths } = c.reflected {
+            let holds = (1..=1 << 20).contains(&paths);
+            rule("capture.reflected.path_traced.paths", paths.to_string(), holds, "use 1 to 1048576");
+        }
         let probe = c.probe_emitter_samples;
         rule("capture.probe_emitter_samples", probe.to_string(), probe <= 1 << 20, "use 0 to 1048576");
         rule(

@@ -6,6 +6,7 @@ use ron::error::SpannedError;
 const FORMS: &[(&str, &str)] = &[
     ("cosine", "cosine(floor: 0.05)"),
     ("wrap", "wrap(offset: 0.2)"),
+    ("path_traced", "path_traced(paths: 16)"),
     ("moments", "moments(power: 3, floor: 0.05)"),
     ("surface", "surface(voxels_per_cell: 8)"),
 ];

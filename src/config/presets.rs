@@ -9,11 +9,18 @@ pub struct Preset {
     text: &'static str,
 }
 
-pub const PRESETS: &[Preset] = &[Preset {
-    name: "default",
-    summary: "visibility measured at the surfaces, sampled emission, iterated bounces",
-    text: include_str!("../../configs/presets/default.ron"),
-}];
+pub const PRESETS: &[Preset] = &[
+    Preset {
+        name: "default",
+        summary: "visibility measured at the surfaces, sampled emission, iterated bounces",
+        text: include_str!("../../configs/presets/default.ron"),
+    },
+    Preset {
+        name: "path",
+        summary: "as default, but lit by full paths at every hit: the truth at the probes",
+        text: include_str!("../../configs/presets/path.ron"),
+    },
+];
 
 impl Preset {
     pub fn config(&self) -> Result<Config, ConfigError> {

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use exr::block::lines::LineRef;
-use exr::meta::attribute::SampleType;
+use exr::meta::attribute::{AttributeValue, ChannelDescription, SampleType, Text};
 use exr::meta::header::Header;
 use glam::Vec3;
 use half::f16;
 
 use super::error::ImageError;
 use super::exr_file::ExrFile;
-use super::layered::{BEAUTY, LayeredImage};
+use super::layered::{BEAUTY, LayeredImage, STATE, TEXTS};
 use super::picture::Picture;
 
 /// Name of the layer of the plain channels, while a file is being read.
@@ -36,7 +36,7 @@ impl Picture {
             return Err(no_color(path, file.headers()));
         };
         let size = file.headers()[part].layer_size;
-        let layers = read_layers(file, part, BTreeMap::from([(PLAIN.to_owned(), channels)]))?;
+        let (layers, _) = read_layers(file, part, BTreeMap::from([(PLAIN.to_owned(), channels)]), BTreeMap::new())?;
         let pixels = layers.into_iter().flat_map(|layer| layer.pixels).collect();
         Ok(Picture::from_pixels(size.width() as u32, size.height() as u32, pixels))
     }
@@ -44,7 +44,8 @@ impl Picture {
 
 impl LayeredImage {
     /// Reads every layer that has the three channels `layer.R`, `layer.G`, `layer.B`, sorted by name, from the first part that has
-    /// any colour. A part with plain R, G, B only gives the one layer `beauty`.
+    /// any colour, and what [`LayeredImage::write_exr`] wrote of words and texts. A part with plain R, G, B only gives the one layer
+    /// `beauty`.
     ///
     /// # Errors
     /// A file that cannot be opened, is damaged, is deep or subsampled, or has no colour at all.
@@ -60,8 +61,14 @@ impl LayeredImage {
         }
         let size = file.headers()[part].layer_size;
         let mut image = LayeredImage::new(size.width() as u32, size.height() as u32);
-        for layer in read_layers(file, part, wanted)? {
+        image.texts = texts_of(&file.headers()[part]);
+        let words = words_of(&file.headers()[part]);
+        let (layers, words) = read_layers(file, part, wanted, words)?;
+        for layer in layers {
             image.push(if layer.name == PLAIN { BEAUTY } else { &layer.name }, layer.pixels);
+        }
+        for (name, words) in words {
+            image.push_words(&name, words);
         }
         Ok(image)
     }
@@ -81,29 +88,73 @@ fn layers_of(header: &Header) -> BTreeMap<String, [usize; 3]> {
     found.into_iter().filter_map(whole).collect()
 }
 
-fn read_layers(file: ExrFile<'_>, part: usize, wanted: BTreeMap<String, [usize; 3]>) -> Result<Vec<Layer>, ImageError> {
+/// The part's channels of words, by name: their places in the file.
+fn words_of(header: &Header) -> BTreeMap<String, usize> {
+    let words = |(place, channel): (usize, &ChannelDescription)| {
+        let name = channel.name.to_string().strip_prefix(STATE)?.to_owned();
+        (channel.sample_type == SampleType::U32).then_some((name, place))
+    };
+    header.channels.list.iter().enumerate().filter_map(words).collect()
+}
+
+/// The part's texts; none where they are not what `exr_write` writes.
+fn texts_of(header: &Header) -> BTreeMap<String, String> {
+    match header.own_attributes.other.get(&Text::from(TEXTS)) {
+        Some(AttributeValue::Text(json)) => serde_json::from_slice(json.as_slice()).unwrap_or_default(),
+        _ => BTreeMap::new(),
+    }
+}
+
+/// Layers and words by name.
+type Read = (Vec<Layer>, BTreeMap<String, Vec<u32>>);
+
+fn read_layers(
+    file: ExrFile<'_>,
+    part: usize,
+    wanted: BTreeMap<String, [usize; 3]>,
+    wanted_words: BTreeMap<String, usize>,
+) -> Result<Read, ImageError> {
     let header = &file.headers()[part];
     let (size, channels) = (header.layer_size, header.channels.clone());
     let blank = |(name, channels)| Layer { name, channels, pixels: vec![Vec3::ZERO; size.area()] };
     let mut layers: Vec<Layer> = wanted.into_iter().map(blank).collect();
-    // Which layer and component each channel of the file goes to.
+    let mut words: Vec<Vec<u32>> = wanted_words.values().map(|_| vec![0; size.area()]).collect();
+    // Where each channel of the file goes to.
     let mut targets = vec![None; channels.list.len()];
     for (index, layer) in layers.iter().enumerate() {
         for (component, &channel) in layer.channels.iter().enumerate() {
-            targets[channel] = Some((index, component));
+            targets[channel] = Some(Target::Layer { index, component });
         }
+    }
+    for (index, &channel) in wanted_words.values().enumerate() {
+        targets[channel] = Some(Target::Words { index });
     }
     file.for_each_block(part, |block| {
         for line in block.lines(&channels) {
             let place = line.location;
-            if let Some((layer, component)) = targets[place.channel] {
-                let start = place.position.y() * size.width() + place.position.x();
-                let row = &mut layers[layer].pixels[start..start + place.sample_count];
-                read_line(&line, channels.list[place.channel].sample_type, row, component);
+            let start = place.position.y() * size.width() + place.position.x();
+            let row = start..start + place.sample_count;
+            match targets[place.channel] {
+                None => {}
+                Some(Target::Layer { index, component }) => {
+                    let sample_type = channels.list[place.channel].sample_type;
+                    read_line(&line, sample_type, &mut layers[index].pixels[row], component);
+                }
+                Some(Target::Words { index }) => {
+                    let samples = line.value.as_chunks::<4>().0;
+                    words[index][row].iter_mut().zip(samples).for_each(|(word, &s)| *word = u32::from_ne_bytes(s));
+                }
             }
         }
     })?;
-    Ok(layers)
+    Ok((layers, wanted_words.into_keys().zip(words).collect()))
+}
+
+/// Where a channel's samples go.
+#[derive(Debug, Clone, Copy)]
+enum Target {
+    Layer { index: usize, component: usize },
+    Words { index: usize },
 }
 
 /// Decompressed lines are in the machine's own byte order and as long as their pixels: the decoder has made sure.

@@ -2,10 +2,11 @@
 //!
 //! The same image gives the same bytes: lines are in increasing order, and no date and no path is stored.
 
+use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
-use exr::meta::attribute::Chromaticities;
+use exr::meta::attribute::{AttributeValue, Chromaticities};
 use exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, Layer, LayerAttributes, LineOrder,
     SmallVec, Text, Vec2, WritableImage,
@@ -13,7 +14,7 @@ use exr::prelude::{
 use glam::Vec3;
 
 use super::error::ImageError;
-use super::layered::LayeredImage;
+use super::layered::{LayeredImage, STATE, TEXTS};
 use super::picture::Picture;
 use crate::output::write_atomically;
 
@@ -38,12 +39,17 @@ impl LayeredImage {
     /// # Errors
     /// Those of [`write_atomically`], no pixels, no layers, and names that are not plain identifiers.
     pub fn write_exr(&self, path: &Path) -> Result<(), ImageError> {
-        if let Some(name) = self.names().find(|name| !is_identifier(name)) {
+        let words = || self.all_words().iter();
+        if let Some(name) = self.names().chain(words().map(|(name, _)| name.as_str())).find(|name| !is_identifier(name))
+        {
             return Err(ImageError::LayerName { path: path.to_owned(), name: name.to_owned() });
         }
         let plain = self.plain_layer().map(|pixels| (PLAIN, pixels));
-        let channels = self.layers().chain(plain).flat_map(|(name, pixels)| rgb_channels(name, pixels)).collect();
-        write_channels(path, self.width, self.height, channels)
+        let mut channels: Vec<_> =
+            self.layers().chain(plain).flat_map(|(name, pixels)| rgb_channels(name, pixels)).collect();
+        channels
+            .extend(words().map(|(name, words)| channel(&format!("{STATE}{name}"), FlatSamples::U32(words.clone()))));
+        write_channels(path, self.width, self.height, channels, &self.texts)
     }
 }
 
@@ -53,7 +59,7 @@ impl Picture {
     /// # Errors
     /// Those of [`write_atomically`], and a picture without pixels.
     pub fn write_exr(&self, path: &Path) -> Result<(), ImageError> {
-        write_channels(path, self.width, self.height, rgb_channels(PLAIN, &self.pixels).into())
+        write_channels(path, self.width, self.height, rgb_channels(PLAIN, &self.pixels).into(), &BTreeMap::new())
     }
 }
 
@@ -65,14 +71,14 @@ fn is_identifier(name: &str) -> bool {
 /// The channels `name.R`, `name.G`, `name.B`; plain `R`, `G`, `B` for the name [`PLAIN`].
 fn rgb_channels(name: &str, pixels: &[Vec3]) -> [AnyChannel<FlatSamples>; 3] {
     [("R", 0), ("G", 1), ("B", 2)].map(|(letter, component)| {
-        let channel = if name == PLAIN { letter.to_owned() } else { format!("{name}.{letter}") };
-        AnyChannel {
-            name: Text::from(channel.as_str()),
-            sample_data: FlatSamples::F32(pixels.iter().map(|pixel| pixel[component]).collect()),
-            quantize_linearly: false,
-            sampling: Vec2(1, 1),
-        }
+        let full_name = if name == PLAIN { letter.to_owned() } else { format!("{name}.{letter}") };
+        channel(&full_name, FlatSamples::F32(pixels.iter().map(|pixel| pixel[component]).collect()))
     })
+}
+
+/// `name` is ASCII.
+fn channel(name: &str, samples: FlatSamples) -> AnyChannel<FlatSamples> {
+    AnyChannel { name: Text::from(name), sample_data: samples, quantize_linearly: false, sampling: Vec2(1, 1) }
 }
 
 fn write_channels(
@@ -80,11 +86,19 @@ fn write_channels(
     width: u32,
     height: u32,
     channels: Vec<AnyChannel<FlatSamples>>,
+    texts: &BTreeMap<String, String>,
 ) -> Result<(), ImageError> {
     if width == 0 || height == 0 || channels.is_empty() {
         return Err(ImageError::Empty { path: path.to_owned(), width, height });
     }
-    let attributes = LayerAttributes { software_name: Some(Text::from("lightprobe")), ..LayerAttributes::default() };
+    let mut attributes =
+        LayerAttributes { software_name: Some(Text::from("lightprobe")), ..LayerAttributes::default() };
+    if !texts.is_empty() {
+        // One attribute, because the crate writes several in random order; its texts are bytes, here UTF-8. Plain
+        // texts by name: nothing in them can fail to serialise.
+        let json = serde_json::to_vec(texts).unwrap_or_default();
+        attributes.other.insert(Text::from(TEXTS), AttributeValue::Text(Text::from_slice_unchecked(&json)));
+    }
     let encoding =
         Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
     let size = Vec2(width as usize, height as usize);

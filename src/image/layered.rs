@@ -1,5 +1,7 @@
 //! A picture in several layers: beauty, irradiance, albedo, depth and so on.
 
+use std::collections::BTreeMap;
+
 use glam::Vec3;
 
 use super::picture::Picture;
@@ -7,19 +9,29 @@ use super::picture::Picture;
 /// Name of the layer that plain viewers show.
 pub(super) const BEAUTY: &str = "beauty";
 
+/// Start of the channel names of words.
+pub(super) const STATE: &str = "state.";
+
+/// Name of the attribute that holds the texts, as JSON.
+pub(super) const TEXTS: &str = "lightprobe";
+
 /// Layers of one size, in the order in which they were added; each linear RGB, row 0 at the top.
 ///
-/// On disk one EXR part with the channels `layer.R`, `layer.G`, `layer.B`, and plain `R`, `G`, `B` for the layer `beauty`.
+/// On disk one EXR part with the channels `layer.R`, `layer.G`, `layer.B`, and plain `R`, `G`, `B` for the layer `beauty`;
+/// `state.name` for words, and the texts as one attribute.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayeredImage {
     pub width: u32,
     pub height: u32,
+    /// What else there is to say about the picture, by name.
+    pub texts: BTreeMap<String, String>,
     layers: Vec<(String, Vec<Vec3>)>,
+    words: BTreeMap<String, Vec<u32>>,
 }
 
 impl LayeredImage {
     pub fn new(width: u32, height: u32) -> LayeredImage {
-        LayeredImage { width, height, layers: Vec::new() }
+        LayeredImage { width, height, texts: BTreeMap::new(), layers: Vec::new(), words: BTreeMap::new() }
     }
 
     /// Adds a layer of colours; a layer of the same name is replaced in its place.
@@ -40,6 +52,25 @@ impl LayeredImage {
     /// When `values` does not hold `width · height` of them.
     pub fn push_scalar(&mut self, name: &str, values: &[f32]) {
         self.push(name, values.iter().map(|&value| Vec3::splat(value)).collect());
+    }
+
+    /// Adds a word for every pixel that is no colour to look at: what a later run needs to go on.
+    ///
+    /// # Panics
+    /// When `words` does not hold `width · height` of them.
+    pub fn push_words(&mut self, name: &str, words: Vec<u32>) {
+        assert_eq!(words.len(), self.width as usize * self.height as usize, "words of {name}");
+        self.words.insert(name.to_owned(), words);
+    }
+
+    /// What [`LayeredImage::push_words`] was given under this name.
+    pub fn words(&self, name: &str) -> Option<&[u32]> {
+        self.words.get(name).map(Vec::as_slice)
+    }
+
+    /// All words, sorted by name.
+    pub(super) fn all_words(&self) -> &BTreeMap<String, Vec<u32>> {
+        &self.words
     }
 
     pub fn is_empty(&self) -> bool {

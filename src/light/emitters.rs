@@ -11,9 +11,7 @@ use glam::{Vec2, Vec3};
 use crate::math::alias::AliasTable;
 use crate::math::color::luminance;
 use crate::math::random::unit_from_bits;
-use crate::math::sampling::{
-    UNIFORM_SPHERE_DENSITY, cosine_hemisphere_density, triangle_barycentric, uniform_sphere,
-};
+use crate::math::sampling::{UNIFORM_SPHERE_DENSITY, cosine_hemisphere_density, triangle_barycentric, uniform_sphere};
 use crate::scene::environment::EnvironmentMap;
 use crate::scene::{Environment, Scene, TriangleIndex};
 use crate::trace::Hit;
@@ -74,7 +72,8 @@ impl EmissiveTriangle {
         let textured = material.emission_texture.is_some()
             || material.base_color_texture.is_some()
             || !scene.mesh.colors.is_empty();
-        let constant_radiance = (!textured).then(|| scene.emission(index, Vec2::ZERO) * scene.opacity(index, Vec2::ZERO));
+        let constant_radiance =
+            (!textured).then(|| scene.emission(index, Vec2::ZERO) * scene.opacity(index, Vec2::ZERO));
         EmissiveTriangle {
             corner: corners[0],
             edges: [corners[1] - corners[0], corners[2] - corners[0]],

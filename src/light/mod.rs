@@ -1,7 +1,10 @@
 //! Light: what a surface sends out and what arrives at it. Bake, render and reference use these and no others.
 
+pub mod bsdf;
 pub mod emitters;
+pub mod ggx;
 pub mod lambert;
+pub mod path;
 pub mod punctual;
 pub mod sampled;
 pub mod surface;

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::World;
+use super::bsdf::Bsdf;
 use super::surface::SurfacePoint;
 use crate::scene::{LightKind, PunctualLight};
 use crate::trace::Ray;
@@ -54,6 +55,24 @@ impl World<'_> {
     /// Irradiance from all punctual lights at a surface with this shading normal, shadowed, W·m⁻²; and the number of
     /// shadow rays that it took.
     pub fn punctual_irradiance(&self, point: &SurfacePoint, normal: Vec3, salt: u32) -> (Vec3, u32) {
+        self.punctual_sum(point, normal, salt, |_, cosine| Vec3::splat(cosine))
+    }
+
+    /// Radiance that a surface reflects of all punctual lights, shadowed, W·m⁻²·sr⁻¹.
+    pub fn punctual_radiance(&self, point: &SurfacePoint, bsdf: &Bsdf, salt: u32) -> Vec3 {
+        self.punctual_sum(point, bsdf.normal(), salt, |direction, cosine| bsdf.scattered(direction, cosine).total()).0
+    }
+
+    /// Sum over lights that are not in shadow of their irradiance × `response` (direction to the light, its cosine), and
+    /// the number of shadow rays.
+    #[inline]
+    fn punctual_sum(
+        &self,
+        point: &SurfacePoint,
+        normal: Vec3,
+        salt: u32,
+        response: impl Fn(Vec3, f32) -> Vec3,
+    ) -> (Vec3, u32) {
         let origin = point.ray_origin();
         let mut rays = 0;
         let mut sum = Vec3::ZERO;
@@ -67,7 +86,7 @@ impl World<'_> {
             rays += 1;
             let t_max = incident.distance;
             if !self.tracer.occluded(Ray { origin, direction: incident.direction, t_max, salt }) {
-                sum += incident.irradiance * cosine;
+                sum += incident.irradiance * response(incident.direction, cosine);
             }
         }
         (sum * self.punctual_scale, rays)

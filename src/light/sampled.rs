@@ -36,6 +36,12 @@ pub struct RayCount {
     pub shadow: u64,
 }
 
+impl RayCount {
+    pub fn total(&self) -> u64 {
+        self.primary + self.shadow
+    }
+}
+
 impl World<'_> {
     /// Whether the light of `sample` reaches `origin`.
     pub fn reaches(&self, origin: Vec3, sample: &LightSample, salt: u32) -> bool {

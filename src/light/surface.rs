@@ -29,6 +29,21 @@ pub struct SurfacePoint {
 }
 
 impl SurfacePoint {
+    /// A point of no surface, which gathers light from the side of unit `normal` as a white one would.
+    pub fn in_space(position: Vec3, normal: Vec3) -> SurfacePoint {
+        SurfacePoint {
+            position,
+            geometric_normal: normal,
+            shading_normal: normal,
+            front: true,
+            double_sided: false,
+            albedo: Vec3::ONE,
+            emission: Vec3::ZERO,
+            ray_offset: 0.0,
+            hit: Hit { t: 0.0, triangle: TriangleIndex(u32::MAX), barycentric: Vec2::ZERO },
+        }
+    }
+
     /// Where rays that leave on the viewer's side start.
     pub fn ray_origin(&self) -> Vec3 {
         self.position + self.geometric_normal * self.ray_offset

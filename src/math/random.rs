@@ -1,5 +1,6 @@
 //! Random numbers that depend on what they are for, never on which thread draws them.
 
+use glam::Vec2;
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::Rng;
 
@@ -15,6 +16,25 @@ pub enum Purpose {
     Pixel = 3,
     /// Points on surfaces from which visibility is measured.
     SurfaceVisibility = 4,
+    /// Paths of the reference.
+    Path = 5,
+    /// Paths from what capture rays hit.
+    ProbePaths = 6,
+    /// Noise that is added to a reference, to see what its own noise does to FLIP.
+    FlipReplicate = 16,
+}
+
+/// Where random decisions take their numbers from: a [`Random`] stream, or points that cover their domain evenly
+/// ([`super::blocks::BlockSample`]).
+pub trait Numbers {
+    /// Uniform in [0,1).
+    fn uniform(&mut self) -> f32;
+
+    /// Uniform over all words.
+    fn bits(&mut self) -> u32;
+
+    /// Uniform in the unit square; for decisions in two dimensions that belong together.
+    fn pair(&mut self) -> Vec2;
 }
 
 /// One stream, named by seed, purpose and up to two indices (probe and texel, pixel and sample, …).
@@ -72,8 +92,27 @@ impl Iterator for Spread {
     }
 }
 
+impl Numbers for Random {
+    #[inline]
+    fn uniform(&mut self) -> f32 {
+        Random::uniform(self)
+    }
+
+    #[inline]
+    fn bits(&mut self) -> u32 {
+        Random::bits(self)
+    }
+
+    #[inline]
+    fn pair(&mut self) -> Vec2 {
+        let x = Random::uniform(self);
+        Vec2::new(x, Random::uniform(self))
+    }
+}
+
 /// Spreads every input bit over all output bits (the finaliser of SplitMix64; Steele, Lea & Flood 2014).
-fn mix(x: u64) -> u64 {
+#[inline]
+pub(super) fn mix(x: u64) -> u64 {
     let x = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     let x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);

@@ -4,14 +4,16 @@
 //! [`Surfel`] — enough to compute its outgoing radiance again and again as bounces are added — and of every texel the
 //! emitted radiance and the distance. Traced once; a bounce costs queries only.
 
-use glam::{UVec2, Vec2, Vec3, Vec3A};
+use glam::{DVec3, UVec2, Vec2, Vec3, Vec3A};
 use serde::{Deserialize, Serialize};
 
-use super::surface_visibility::Facing;
+use super::surfel::Surfel;
 use crate::light::World;
 use crate::light::lambert::reflected_radiance;
+use crate::light::path::PathSettings;
 use crate::light::sampled::{Allocation, RayCount};
 use crate::light::surface::SurfacePoint;
+use crate::math::blocks::{BLOCK, Block};
 use crate::math::octahedral::{direction_and_density, oct_from_direction, solid_angle_density};
 use crate::math::random::{Purpose, Random, Spread};
 use crate::math::statistics::Moments;
@@ -27,6 +29,19 @@ pub enum EmissionTransport {
     Gathered,
 }
 
+/// How light that surfaces have reflected reaches the surfaces that probes see.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum ReflectedLight {
+    /// The probes' own irradiance is asked at every hit, bounce after bounce.
+    ThroughProbes,
+    /// Paths are traced from every hit until they end: the truth at the probes, up to resolution and noise.
+    PathTraced {
+        /// At every hit.
+        paths: u32,
+    },
+}
+
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CaptureSettings {
@@ -34,6 +49,7 @@ pub struct CaptureSettings {
     pub resolution: usize,
     /// Stratified rays per texel.
     pub samples_per_texel: usize,
+    pub reflected: ReflectedLight,
     pub emission: EmissionTransport,
     /// Emitter samples at every hit (with `emission: sampled`).
     pub emitter_samples: u32,
@@ -46,67 +62,11 @@ impl Default for CaptureSettings {
         CaptureSettings {
             resolution: 32,
             samples_per_texel: 1,
+            reflected: ReflectedLight::ThroughProbes,
             emission: EmissionTransport::Sampled,
             emitter_samples: 4,
             probe_emitter_samples: 64,
         }
-    }
-}
-
-/// A captured hit, in few bytes: a capture takes as long to be written to fresh memory as Embree takes for some of its
-/// rays, and every bounce reads it all.
-///
-/// Albedo and radiance are multiplied by the share of its texel's solid angle that the hit stands for, so that a texel's
-/// radiance is the sum over its surfels.
-#[derive(Debug, Clone, Copy)]
-pub struct Surfel {
-    /// Relative to the scene's origin.
-    pub position: Vec3,
-    /// B⁰: radiance reflected from light that did not pass through probes, times the share, W·m⁻²·sr⁻¹.
-    pub direct_radiance: Vec3,
-    pub texel: u32,
-    /// `oct` of the shading normal, towards the probe, in units of 1/[`NORMAL_SCALE`].
-    oct: [i16; 2],
-    /// Albedo times the share, in units of 1/[`ALBEDO_SCALE`].
-    albedo: [u16; 3],
-    /// Main direction of the geometric normal, towards the probe.
-    pub facing: Facing,
-}
-
-/// Steps of 1/32767 in `oct` are at most 10⁻⁴ rad: a thousandth of a texel of the maps that are asked.
-const NORMAL_SCALE: f32 = i16::MAX as f32;
-
-/// Steps of 1/65535 err by 10⁻⁵ of a typical albedo, upwards as often as downwards: a tenth of the solver's tolerance.
-const ALBEDO_SCALE: f32 = u16::MAX as f32;
-
-const _: () = assert!(size_of::<Surfel>() == 40);
-
-impl Surfel {
-    fn new(surface: &SurfacePoint, direct_radiance: Vec3, texel: u32, share: f32) -> Surfel {
-        // Adding a half before truncation rounds.
-        let oct = oct_from_direction(surface.shading_normal) * NORMAL_SCALE;
-        let albedo = surface.albedo * (share * ALBEDO_SCALE) + 0.5;
-        Surfel {
-            position: surface.position,
-            direct_radiance: direct_radiance * share,
-            texel,
-            oct: [oct.x, oct.y].map(|x| (x + 0.5f32.copysign(x)) as i16),
-            albedo: [albedo.x as u16, albedo.y as u16, albedo.z as u16],
-            facing: Facing::of(surface.geometric_normal),
-        }
-    }
-
-    /// `oct` of the shading normal.
-    #[inline]
-    pub fn oct(&self) -> Vec2 {
-        Vec2::new(f32::from(self.oct[0]), f32::from(self.oct[1])) * (1.0 / NORMAL_SCALE)
-    }
-
-    /// Albedo times the share.
-    #[inline]
-    pub fn albedo(&self) -> Vec3 {
-        let [r, g, b] = self.albedo.map(f32::from);
-        Vec3::new(r, g, b) * (1.0 / ALBEDO_SCALE)
     }
 }
 
@@ -203,7 +163,10 @@ impl Capture<'_, '_> {
                 }
             }
             for (ray, surface) in &lit {
-                self.light(ray, surface, allocation, &mut random, &mut out);
+                match self.settings.reflected {
+                    ReflectedLight::ThroughProbes => self.light(ray, surface, allocation, &mut random, &mut out),
+                    ReflectedLight::PathTraced { paths } => self.light_by_paths(index, ray, surface, paths, &mut out),
+                }
             }
         }
         out.rays.primary += (self.texels() * samples) as u64;
@@ -279,6 +242,30 @@ impl Capture<'_, '_> {
             direct = Vec3::ZERO;
         }
         out.surfels.push(Surfel::new(surface, direct, ray.texel, ray.share));
+    }
+
+    /// Lights a hit with all light there is and keeps it, as a surface that reflects none of the probes' light.
+    fn light_by_paths(&self, probe: usize, ray: &TexelRay, surface: &SurfacePoint, paths: u32, out: &mut ProbeCapture) {
+        let world = self.world;
+        let normal = surface.shading_normal;
+        let settings = PathSettings::default();
+        let hit = out.surfels.len() as u64;
+        let block = |i: u32| Block::new(self.seed, Purpose::ProbePaths, probe as u64, hit << 32 | u64::from(i / BLOCK));
+        let mut sum = DVec3::ZERO;
+        for i in 0..paths {
+            let mut numbers = block(i).sample(i % BLOCK);
+            let gathered = world.gather(surface, normal, -ray.direction, &settings, &mut numbers, &mut out.rays);
+            if gathered.irradiance.is_finite() {
+                sum += gathered.irradiance.as_dvec3();
+            } else {
+                out.non_finite += 1;
+            }
+        }
+        let (punctual, shadow_rays) = world.punctual_irradiance(surface, normal, block(0).sample(0).salt());
+        out.rays.shadow += u64::from(shadow_rays);
+        let irradiance = punctual + (sum / f64::from(paths.max(1))).as_vec3();
+        let radiance = reflected_radiance(surface.albedo, irradiance);
+        out.surfels.push(Surfel::new(&SurfacePoint { albedo: Vec3::ZERO, ..*surface }, radiance, ray.texel, ray.share));
     }
 
     /// Draws emitters from the probe's centre.

@@ -18,7 +18,9 @@ pub mod placement;
 pub mod query;
 pub mod solver;
 pub mod surface_visibility;
+pub mod surfel;
 pub mod survey;
+pub mod truth;
 pub mod volume;
 
 pub use grid::{Grid, ProbeIndex};

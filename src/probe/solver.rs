@@ -10,11 +10,12 @@ use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::capture::{ProbeCapture, Surfel};
+use super::capture::ProbeCapture;
 use super::filter::Kernel;
 use super::map::fill_with_border;
 use super::placement::ProbeState;
 use super::query::{Query, QueryPoint, QuerySettings, Visibility};
+use super::surfel::Surfel;
 use super::volume::Volume;
 use crate::light::lambert::reflected_radiance;
 use crate::math::color::luminance;

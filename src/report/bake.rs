@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::header::Header;
 use crate::plan::Line;
 use crate::probe::solver::Bounce;
 
@@ -12,14 +13,8 @@ pub const SCHEMA: &str = "lightprobe-bake/1";
 
 #[derive(Debug, Clone, Serialize)]
 pub struct BakeReport {
-    pub schema: &'static str,
-    pub version: &'static str,
-    pub command: &'static str,
-    pub seed: u64,
-    pub threads: usize,
-    pub scene_blake3: String,
-    /// Effective configuration, RON.
-    pub config: String,
+    #[serde(flatten)]
+    pub header: Header,
     pub probes: usize,
     pub probes_active: usize,
     pub rays: Rays,

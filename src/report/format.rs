@@ -64,6 +64,25 @@ pub fn significant(value: f64, digits: usize) -> String {
     }
 }
 
+/// A value and its standard error with equal decimals, two digits of the error shown: "12.34 ± 0.12". A value of table digits where
+/// there is no error, or none to be seen beside it.
+pub fn with_error(value: f64, error: Option<f64>) -> String {
+    // Finer errors would only lengthen the value.
+    const MAX_DIGITS: i32 = 5;
+    let plain = significant(value, TABLE_DIGITS);
+    let Some(error) = error.filter(|e| e.is_finite() && *e > 0.0).filter(|_| value.is_finite()) else { return plain };
+    let exponent = |x: f64| x.abs().log10().floor() as i32;
+    let decimals = 1 - exponent(error);
+    let most = if value == 0.0 { decimals } else { MAX_DIGITS - 1 - exponent(value).max(exponent(error)) };
+    if !(-6..=6).contains(&decimals) {
+        return format!("{plain} ± {}", significant(error, 2));
+    }
+    let decimals = decimals.min(most).max(0) as usize;
+    // What is below the last digit shown is rounded up to it: an error of 0 would be a lie.
+    let error = error.max(10_f64.powi(-(decimals as i32)));
+    format!("{value:.decimals$} ± {error:.decimals$}")
+}
+
 /// A count with its thousands set apart by thin gaps: 1234567 gives "1 234 567".
 pub fn count(count: u64) -> String {
     let digits = count.to_string();
@@ -136,6 +155,22 @@ mod tests {
         ];
         for (value, text) in cases {
             assert_eq!(significant(value, 3), text);
+        }
+    }
+
+    #[test]
+    fn values_have_the_decimals_of_their_errors() {
+        let cases = [
+            (12.3456, Some(0.1234), "12.35 ± 0.12"),
+            (0.0, Some(0.5), "0.00 ± 0.50"),
+            (1234.5, Some(56.0), "1234 ± 56"),
+            (2.34567, Some(0.000_01), "2.3457 ± 0.0001"),
+            (2.0e-9, Some(1.0e-10), "2.00e-9 ± 1.0e-10"),
+            (12.3456, None, "12.3"),
+            (12.3456, Some(0.0), "12.3"),
+        ];
+        for (value, error, text) in cases {
+            assert_eq!(with_error(value, error), text);
         }
     }
 

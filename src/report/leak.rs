@@ -1,12 +1,13 @@
 //! Leak figures: light that came through walls, and light that the visibility test took away by mistake.
 //!
-//! All compare against Ê, the same weights with exact ray visibility, so they are free of interpolation error and need
-//! no reference. Sums run over image points by their share of a pixel, in luminance; points that see no probe at all
+//! All but [`dark_region`] compare against Ê, the same weights with exact ray visibility, so they are free of interpolation
+//! error and need no reference. Sums run over image points by their share of a pixel, in luminance; points that see no probe at all
 //! are left out and counted.
 
 use glam::Vec3;
 use serde::Serialize;
 
+use super::reference_layers::ReferenceLayers;
 use crate::math::color::luminance;
 use crate::probe::query::Query;
 use crate::shade::methods::Method;
@@ -24,6 +25,42 @@ pub struct Leak {
     pub weight: Option<f64>,
     /// Share of the image's points that see none of their probes.
     pub unseen: f64,
+    /// Mean irradiance where the reference has none, as a share of the reference's mean: see [`dark_region`]; `null` without a
+    /// reference.
+    pub dark_region: Option<f64>,
+    /// Σ max(0, E_p − E_path) ÷ ΣE_path over active probes: what leaked into the probes themselves
+    /// ([`super::baked`]); `null` without a traced reference.
+    pub baked: Option<f64>,
+}
+
+/// Irradiance that counts as none, as a share of the reference's mean over the picture.
+const DARK_SHARE: f64 = 1.0e-3;
+
+/// How sure the reference must be that a pixel is dark: standard errors of its luminance.
+const DARK_SIGMAS: f64 = 3.0;
+
+/// Mean luminance of a method's indirect irradiance over the pixels with E_ref + 3σ < 10⁻³·mean(E_ref), ÷ mean(E_ref).
+///
+/// `shown`: whether a pixel shows a surface. `None` where no pixel is dark, where all are, and where the reference does not know
+/// its σ.
+///
+/// # Panics
+/// When the pixels of the two or of `shown` differ in number.
+pub fn dark_region(irradiance: &[Vec3], reference: &ReferenceLayers, shown: &[bool]) -> Option<f64> {
+    assert_eq!(irradiance.len(), reference.irradiance.len(), "pixels of the picture");
+    let noise = reference.noise.as_ref()?;
+    let used = |i: usize| shown[i] && reference.is_finite(i) && irradiance[i].is_finite();
+    let mean = reference.means(used).0.filter(|mean| *mean > 0.0)?;
+    let (mut sum, mut count) = (0.0, 0.0f64);
+    for i in (0..irradiance.len()).filter(|&i| used(i)) {
+        let surely_below =
+            f64::from(luminance(reference.irradiance[i])) + DARK_SIGMAS * noise.luminance_variance(i).sqrt();
+        if surely_below < DARK_SHARE * mean {
+            sum += f64::from(luminance(irradiance[i]));
+            count += 1.0;
+        }
+    }
+    (count > 0.0).then(|| sum / count / mean)
 }
 
 /// Figures of one method from its irradiance and that with exact visibility.
@@ -73,5 +110,7 @@ pub fn measure(
         fraction: ratio(from_hidden, from_all),
         weight: ratio(hidden_weight, seen),
         unseen: ratio(unseen, seen + unseen).unwrap_or(0.0),
+        dark_region: None,
+        baked: None,
     }
 }

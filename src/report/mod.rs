@@ -1,14 +1,19 @@
 //! Figures and pictures for people and machines: reports, tables, false-colour pictures, text in pictures.
 
 pub mod bake;
+pub mod baked;
 pub mod canvas;
 pub mod colormap;
+pub mod error;
 pub mod font;
 pub mod format;
+pub mod header;
 pub mod heatmap;
 pub mod leak;
 pub mod legend;
 pub mod probe_key;
+pub mod reference;
+pub mod reference_layers;
 pub mod render;
 pub mod table;
 pub mod text;

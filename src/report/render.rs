@@ -2,6 +2,9 @@
 
 use serde::Serialize;
 
+use super::baked::BakedReport;
+use super::error::ErrorReport;
+use super::header::Header;
 use super::leak::Leak;
 
 /// Version of the report's layout.
@@ -9,14 +12,9 @@ pub const SCHEMA: &str = "lightprobe-render/1";
 
 #[derive(Debug, Clone, Serialize)]
 pub struct RenderReport {
-    pub schema: &'static str,
-    pub version: &'static str,
-    pub command: &'static str,
-    pub seed: u64,
-    pub threads: usize,
-    pub scene_blake3: String,
-    /// Configuration of the bake, RON.
-    pub config: String,
+    /// Its configuration is that of the bake.
+    #[serde(flatten)]
+    pub header: Header,
     /// Whether the probes were baked from other bytes than the scene now has (`--allow-scene-change`).
     pub scene_changed: bool,
     pub camera: String,
@@ -30,7 +28,25 @@ pub struct RenderReport {
     pub probes_active: usize,
     pub time_s: RenderTimes,
     pub peak_memory_bytes: u64,
+    /// What the methods' `error` compares with.
+    pub reference: Option<ReferenceSummary>,
+    /// The file's probes against the same probes lit by full paths; `null` without a traced reference.
+    pub baked: Option<BakedReport>,
     pub methods: Vec<MethodReport>,
+}
+
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct ReferenceSummary {
+    /// As it was given; `null` where the reference was traced.
+    pub file: Option<String>,
+    /// Samples per pixel; `null` where a file does not say.
+    pub spp: Option<u32>,
+    /// Spent on tracing it, in the run that did.
+    pub time_s: Option<f64>,
+    /// Mean over the pixels that show a surface, luminance, W·m⁻².
+    pub irradiance_indirect_mean: Option<f64>,
+    /// Mean over these pixels of the standard error of that luminance, W·m⁻²; `null` where the noise is not known.
+    pub standard_error_mean: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, Default, Serialize)]
@@ -57,6 +73,11 @@ pub struct MethodReport {
     /// Mean over image points, luminance, W·m⁻².
     pub irradiance_indirect_mean: Option<f64>,
     pub leak: Leak,
+    /// Against a reference of diffuse transport, as probes have it; `null` without one.
+    pub error: Option<ErrorReport>,
+    /// Against a reference with glossy transport, which probes do not have; absent without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_gltf: Option<ErrorReport>,
 }
 
 #[derive(Debug, Clone, Copy, Serialize)]

@@ -54,43 +54,53 @@ pub struct View {
 
 /// Shoots the picture's primary rays, through pixel centres, and the shadow rays of punctual lights.
 pub fn see(world: &World, camera: &Camera, width: u32, height: u32, seed: u64) -> View {
-    let blended = world.scene.materials.iter().any(|m| m.alpha_mode == AlphaMode::Blend);
-    let samples = if blended { BLEND_SAMPLES } else { 1 };
+    let samples = if has_blend(world) { BLEND_SAMPLES } else { 1 };
     let pixel = |index: u32| {
-        let (origin, direction) = camera.pixel_ray(index % width, index / width, width, height);
         let mut random = Random::new(seed, Purpose::Pixel, u64::from(index), 0);
-        let mut points: Vec<ImagePoint> = Vec::with_capacity(1);
-        let mut sky = Vec3::ZERO;
-        let weight = 1.0 / samples as f32;
-        for _ in 0..samples {
-            let ray = Ray::new(origin, direction, random.bits());
-            let Some(hit) = world.tracer.closest(ray) else {
-                sky += world.scene.environment.radiance(direction) * weight;
-                continue;
-            };
-            if let Some(known) = points.iter_mut().find(|p| p.surface.hit == hit) {
-                known.weight += weight;
-                continue;
-            }
-            let surface = world.surface_at(hit, direction);
-            let normal = world.bent_normal(&surface);
-            let (irradiance_direct, _) = world.punctual_irradiance(&surface, normal, random.bits());
-            let depth = hit.t;
-            points.push(ImagePoint {
-                pixel: index,
-                weight,
-                surface,
-                normal,
-                view: -direction,
-                depth,
-                irradiance_direct,
-            });
-        }
-        (points, sky)
+        see_pixel(world, camera, width, height, index, samples, &mut random)
     };
     let found: Vec<(Vec<ImagePoint>, Vec3)> = (0..width * height).into_par_iter().map(pixel).collect();
     let sky = found.iter().map(|f| f.1).collect();
     View { width, height, points: found.into_iter().flat_map(|f| f.0).collect(), sky }
+}
+
+/// Whether rays meet surfaces by chance.
+pub fn has_blend(world: &World) -> bool {
+    world.scene.materials.iter().any(|m| m.alpha_mode == AlphaMode::Blend)
+}
+
+/// The points that `samples` rays through the centre of pixel `index` meet, each weighted by its share of the rays, and
+/// the radiance of the sky behind the rest.
+pub fn see_pixel(
+    world: &World,
+    camera: &Camera,
+    width: u32,
+    height: u32,
+    index: u32,
+    samples: u32,
+    random: &mut Random,
+) -> (Vec<ImagePoint>, Vec3) {
+    let (origin, direction) = camera.pixel_ray(index % width, index / width, width, height);
+    let mut points: Vec<ImagePoint> = Vec::with_capacity(1);
+    let mut sky = Vec3::ZERO;
+    let weight = 1.0 / samples as f32;
+    for _ in 0..samples {
+        let ray = Ray::new(origin, direction, random.bits());
+        let Some(hit) = world.tracer.closest(ray) else {
+            sky += world.scene.environment.radiance(direction) * weight;
+            continue;
+        };
+        if let Some(known) = points.iter_mut().find(|p| p.surface.hit == hit) {
+            known.weight += weight;
+            continue;
+        }
+        let surface = world.surface_at(hit, direction);
+        let normal = world.bent_normal(&surface);
+        let (irradiance_direct, _) = world.punctual_irradiance(&surface, normal, random.bits());
+        let depth = hit.t;
+        points.push(ImagePoint { pixel: index, weight, surface, normal, view: -direction, depth, irradiance_direct });
+    }
+    (points, sky)
 }
 
 impl World<'_> {

@@ -8,6 +8,7 @@ mod closed_forms;
 mod command_line;
 #[path = "../common/mod.rs"]
 mod common;
+mod comparison;
 mod damage;
 mod decoding;
 mod determinism;
@@ -17,5 +18,7 @@ mod leaks;
 mod plan;
 mod probe_file;
 mod program;
+mod reference;
 mod reports;
 mod shapes;
+mod truth;

@@ -8,7 +8,7 @@ use crate::cli::{RenderArgs, Size};
 use crate::commands::Console;
 use crate::light::World;
 use crate::memory::{TooLittleMemory, available_bytes};
-use crate::output::{Named, check_folder, check_outputs};
+use crate::output::{Named, check_apart, check_folder, check_outputs};
 use crate::scene::Camera;
 use crate::shade::outlook::Outlook;
 
@@ -20,7 +20,7 @@ const POINT_BYTES: f64 = 200.0;
 const FURTHER_POINT_BYTES: f64 = 700.0;
 
 /// Files that a camera's folder gets.
-pub const PICTURES: &[&str] = &[
+const PICTURES: &[&str] = &[
     "visibility_off.exr",
     "visibility_off.png",
     "visibility_on.exr",
@@ -33,23 +33,36 @@ pub const PICTURES: &[&str] = &[
     "report.json",
 ];
 
-pub fn pictures(folder: &Path) -> Vec<Named> {
-    PICTURES.iter().map(|name| Named::new("-o", folder.join(name))).collect()
+/// Those that it gets besides where there is a reference.
+const COMPARISONS: &[&str] = &["error_off.exr", "error_off.png", "error_on.exr", "error_on.png", "reference.png"];
+
+/// A reference that is there may stay in its place: it is copied onto itself.
+const REFERENCE: &str = "reference.exr";
+
+/// All that a camera's folder will hold.
+pub fn pictures(args: &RenderArgs, folder: &Path) -> Vec<Named> {
+    let compared = args.reference.is_some() || args.reference_image.is_some();
+    let comparisons = COMPARISONS.iter().chain([&REFERENCE]).filter(|_| compared);
+    PICTURES.iter().chain(comparisons).map(|name| Named::new("-o", folder.join(name))).collect()
 }
 
 /// Refuses a folder in which not all pictures can be written, before any is made.
-pub fn check_pictures(folder: &Path, inputs: &[Named]) -> Result<()> {
+pub fn check_pictures(args: &RenderArgs, folder: &Path, inputs: &[Named]) -> Result<()> {
     check_folder(folder)?;
     // In a folder that is not there nothing is in the way.
-    if folder.is_dir() {
-        check_outputs(&pictures(folder), inputs)?;
+    if !folder.is_dir() {
+        return Ok(());
     }
-    Ok(())
+    let mut pictures = pictures(args, folder);
+    check_outputs(&pictures, inputs)?;
+    pictures.retain(|picture| !picture.path.ends_with(REFERENCE));
+    let reference = args.reference_image.as_ref().map(|file| Named::new("the reference", file));
+    Ok(check_apart(&pictures, reference.as_slice())?)
 }
 
 /// Warns of cameras that show nothing of use, and refuses pictures that do not fit into memory.
 pub fn check_view(args: &RenderArgs, world: &World, camera: &Camera, console: &Console) -> Result<()> {
-    let Size { width, height } = args.size;
+    let Size { width, height } = args.view.size;
     let outlook = Outlook::new(world, camera, width, height, args.trace.seed);
     if let Some(warning) = outlook.warning() {
         console.warn(format!("camera {}: {warning}", camera.name));

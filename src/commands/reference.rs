@@ -1,0 +1,181 @@
+//! `lightprobe reference`: scene → path-traced picture.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use anyhow::{Result, bail};
+
+use super::camera::cameras;
+use super::{
+    Console, check_apart_from, inputs, load_scene, peak_memory_bytes, resolve_config, set_threads, tell, write_json,
+};
+use crate::cli::{ReferenceArgs, TransportName};
+use crate::light::World;
+use crate::light::bsdf::Transport;
+use crate::light::path::Strategy;
+use crate::math::blocks::BLOCK;
+use crate::output::{Named, check_outputs};
+use crate::report::format;
+use crate::report::header::Header;
+use crate::report::reference::{NoiseReport, Rays, ReferenceReport, ReferenceTimes, SCHEMA};
+use crate::report::table::{Column, Table};
+use crate::shade::film::Noise;
+use crate::shade::reference::{ReferenceSettings, State, Tracing};
+use crate::shade::reference_file::{Identity, resume};
+
+/// How much work a kill may lose.
+const SAVE_INTERVAL: Duration = Duration::from_secs(60);
+
+pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
+    if args.view.camera.as_deref() == Some("all") {
+        bail!("--camera all: a reference is one picture; name one camera");
+    }
+    let config = resolve_config(&args.config, &args.trace)?;
+    let outputs: Vec<Named> = [Named::new("-o", &args.output)]
+        .into_iter()
+        .chain(args.report.as_ref().map(|report| Named::new("--report", report)))
+        .collect();
+    let config_file = args.config.config.as_ref().map(|file| Named::new("the configuration", file));
+    check_outputs(&outputs, &inputs(&args.scene, &args.trace, config_file))?;
+    let threads = set_threads(args.trace.threads)?;
+
+    let started = Instant::now();
+    let mut times = ReferenceTimes::default();
+    let scene = load_scene(&args.scene, &args.trace, &config, console)?;
+    check_apart_from(&scene, &outputs)?;
+    times.load = started.elapsed().as_secs_f64();
+    tell::scene(console, &args.scene, &scene, times.load);
+    let accel_started = Instant::now();
+    let world = World::new(&scene, config.lights.punctual_scale, config.solver.albedo_max)?;
+    times.accel_build = accel_started.elapsed().as_secs_f64();
+
+    let settings = ReferenceSettings {
+        spp: args.spp,
+        seed: args.trace.seed,
+        transport: match args.transport {
+            TransportName::Lambert => Transport::Lambert,
+            TransportName::Gltf => Transport::Gltf,
+        },
+        max_bounces: args.max_bounces,
+        strategy: Strategy::Mis,
+        firefly_clamp: args.firefly_clamp,
+    };
+    let found = cameras(&args.view, &world, console)?;
+    let Some(camera) = found.first() else { bail!("there is no camera; use --look-at") };
+    let size = args.view.size;
+    let identity = Identity::new(&world, camera, size.width, size.height, &settings);
+    let previous = previous(args, &identity, &world, &settings, console)?;
+    let (spp_resumed, rays_before) = previous.as_ref().map_or((0, 0), |p| (p.film.blocks * BLOCK, p.rays.total()));
+
+    let mut tracing = Tracing::new(&world, camera, size.width, size.height, &settings, previous);
+    if tracing.remaining() == 0 {
+        console.warn(format!("{} has {spp_resumed} samples per pixel already", args.output.display()));
+    }
+    times.trace = trace(&mut tracing, args, &identity, console)?;
+    let reference = tracing.develop();
+    let write_started = Instant::now();
+    reference.write(&args.output, &identity)?;
+    times.write = write_started.elapsed().as_secs_f64();
+    times.total = started.elapsed().as_secs_f64();
+
+    if reference.non_finite > 0 {
+        console.warn(format!("{} samples were not finite and count as 0", reference.non_finite));
+    }
+    let rays = reference.rays;
+    let report = ReferenceReport {
+        header: Header::new(SCHEMA, "reference", settings.seed, threads, &scene.blake3, config.to_ron()),
+        camera: camera.name.clone(),
+        width: size.width,
+        height: size.height,
+        transport: format!("{:?}", settings.transport).to_lowercase(),
+        max_bounces: settings.max_bounces,
+        firefly_clamp: settings.firefly_clamp,
+        spp: reference.spp,
+        spp_resumed,
+        rays: Rays { primary: rays.primary, shadow: rays.shadow },
+        time_s: times,
+        rays_per_s: (times.trace > 0.0).then(|| (rays.total() - rays_before) as f64 / times.trace),
+        noise: reference.noise.map(noise_report),
+        non_finite: reference.non_finite,
+        peak_memory_bytes: peak_memory_bytes(),
+    };
+    if let Some(path) = &args.report {
+        write_json(path, &report)?;
+    }
+    if console.json {
+        return console.print(&serde_json::to_string_pretty(&report)?);
+    }
+    console.print(&summary(&report, &args.output))
+}
+
+/// What `--resume` continues.
+fn previous(
+    args: &ReferenceArgs,
+    identity: &Identity,
+    world: &World,
+    settings: &ReferenceSettings,
+    console: &Console,
+) -> Result<Option<State>> {
+    if !args.resume {
+        return Ok(None);
+    }
+    if !args.output.exists() {
+        console.warn(format!("--resume: there is no {}; beginning anew", args.output.display()));
+        return Ok(None);
+    }
+    let state = resume(&args.output, identity, world, settings)?;
+    if state.is_none() {
+        console.warn(format!("--resume: {} has less than {BLOCK} samples; beginning anew", args.output.display()));
+    }
+    Ok(state)
+}
+
+/// Adds blocks until there are enough, and saves what there is now and then; the seconds without saving.
+fn trace(tracing: &mut Tracing, args: &ReferenceArgs, identity: &Identity, console: &Console) -> Result<f64> {
+    let bar = console.progress.stage("reference", tracing.remaining() as usize);
+    let (started, mut saved, mut saving) = (Instant::now(), Instant::now(), Duration::ZERO);
+    while tracing.remaining() > 0 {
+        tracing.advance();
+        bar.inc(1);
+        if let Some(noise) = tracing.noise() {
+            bar.set_message(noise.to_message());
+        }
+        if tracing.remaining() > 0 && saved.elapsed() >= SAVE_INTERVAL {
+            let save_started = Instant::now();
+            tracing.develop().write(&args.output, identity)?;
+            saving += save_started.elapsed();
+            saved = Instant::now();
+        }
+    }
+    bar.finish_and_clear();
+    Ok((started.elapsed() - saving).as_secs_f64())
+}
+
+fn noise_report(noise: Noise) -> NoiseReport {
+    NoiseReport {
+        mean: noise.mean,
+        mean_standard_error: noise.mean_standard_error,
+        relative: (noise.mean > 0.0).then(|| noise.mean_standard_error / noise.mean),
+        rms_standard_error: noise.rms_standard_error,
+    }
+}
+
+fn summary(report: &ReferenceReport, output: &Path) -> String {
+    let mut table = Table::new(&[("reference", Column::Text), ("", Column::Number)]);
+    let millions = |n: u64| format!("{} M", format::significant(n as f64 / 1e6, 3));
+    let noise = report.noise.as_ref();
+    for (name, value) in [
+        ("camera", format!("{}, {}×{}", report.camera, report.width, report.height)),
+        ("samples per pixel", report.spp.to_string()),
+        ("irradiance", format::or_undefined(noise, |n| format::significant(n.mean, 4))),
+        ("standard error", format::or_undefined(noise.and_then(|n| n.relative), format::percent)),
+        ("rays", millions(report.rays.primary + report.rays.shadow)),
+        ("ray rate", format::or_undefined(report.rays_per_s, |r| format!("{} M/s", format::significant(r / 1e6, 3)))),
+        ("tracing", format::seconds(report.time_s.trace)),
+        ("total", format::seconds(report.time_s.total)),
+        ("peak memory", format::bytes(report.peak_memory_bytes)),
+    ] {
+        table.push([name.to_owned(), value]);
+    }
+    format!("{table}\nwrote {}", output.display())
+}

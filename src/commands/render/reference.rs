@@ -1,0 +1,146 @@
+//! What a run's pictures are compared with, where the user gave or asked for a reference.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+
+use super::Run;
+use crate::cli::RenderArgs;
+use crate::image::LayeredImage;
+use crate::math::blocks::BLOCK;
+use crate::output::write_atomically;
+use crate::report::reference_layers::ReferenceLayers;
+use crate::report::render::ReferenceSummary;
+use crate::scene::Camera;
+use crate::shade::points::View;
+use crate::shade::reference::{self, ReferenceSettings};
+use crate::shade::reference_file::Identity;
+use crate::shade::regions::{Region, regions};
+
+/// Where references come from.
+pub enum Source {
+    /// Traced for every camera.
+    Trace { settings: ReferenceSettings },
+    /// One camera's, read from a file.
+    File(Box<ReferenceFile>),
+}
+
+pub struct ReferenceFile {
+    path: PathBuf,
+    image: LayeredImage,
+    layers: ReferenceLayers,
+}
+
+impl Source {
+    /// What the arguments ask for, if anything. A file that is of no use is refused before anything is computed.
+    pub fn of(args: &RenderArgs) -> Result<Option<Source>> {
+        if let Some(spp) = args.reference {
+            let settings = ReferenceSettings { spp, seed: args.trace.seed, ..Default::default() };
+            return Ok(Some(Source::Trace { settings }));
+        }
+        let Some(path) = &args.reference_image else { return Ok(None) };
+        let image = LayeredImage::read_exr(path)?;
+        let size = (args.view.size.width, args.view.size.height);
+        let layers = ReferenceLayers::new(&image, size, spp_of(&image).map(|spp| spp / BLOCK))
+            .with_context(|| format!("--reference-image: cannot compare with {}", path.display()))?;
+        Ok(Some(Source::File(Box::new(ReferenceFile { path: path.clone(), image, layers }))))
+    }
+}
+
+/// Samples per pixel that a file says it has.
+fn spp_of(image: &LayeredImage) -> Option<u32> {
+    image.texts.get("spp")?.parse().ok()
+}
+
+/// The reference of one camera's picture.
+pub struct Reference {
+    pub layers: ReferenceLayers,
+    /// Of every pixel, `None` where it shows no surface.
+    pub regions: Vec<Option<Region>>,
+    pub summary: ReferenceSummary,
+    /// Whether its surfaces are glossy, as those of probes are not.
+    pub glossy: bool,
+    origin: Origin,
+}
+
+enum Origin {
+    Traced(Box<reference::Reference>, Identity),
+    File(PathBuf),
+}
+
+impl Reference {
+    /// The camera's reference, where one is wanted.
+    pub fn obtain(run: &Run, camera: &Camera, view: &View) -> Result<Option<Reference>> {
+        Ok(match &run.reference {
+            None => None,
+            Some(Source::Trace { settings }) => Some(Reference::trace(run, camera, view, settings)?),
+            Some(Source::File(file)) => {
+                let ReferenceFile { path, image, layers } = &**file;
+                check_file(run, camera, view, path, image)?;
+                let summary = ReferenceSummary { file: Some(path.display().to_string()), ..Default::default() };
+                let summary = ReferenceSummary { spp: spp_of(image), ..summary };
+                let glossy = image.texts.get("transport").is_some_and(|t| t == "gltf");
+                Some(Reference::new(run, view, layers.clone(), summary, glossy, Origin::File(path.clone())))
+            }
+        })
+    }
+
+    fn trace(run: &Run, camera: &Camera, view: &View, settings: &ReferenceSettings) -> Result<Reference> {
+        let (width, height) = (view.width, view.height);
+        let started = Instant::now();
+        let traced = reference::trace(run.world, camera, width, height, settings, run.console.progress, None);
+        let time_s = started.elapsed().as_secs_f64();
+        if traced.non_finite > 0 {
+            run.console.warn(format!("{} samples of the reference were not finite and count as 0", traced.non_finite));
+        }
+        let identity = Identity::new(run.world, camera, width, height, settings);
+        let layers = ReferenceLayers::new(&traced.image, (width, height), Some(traced.spp / BLOCK))?;
+        let summary = ReferenceSummary { spp: Some(traced.spp), time_s: Some(time_s), ..Default::default() };
+        Ok(Reference::new(run, view, layers, summary, false, Origin::Traced(Box::new(traced), identity)))
+    }
+
+    fn new(
+        run: &Run,
+        view: &View,
+        layers: ReferenceLayers,
+        summary: ReferenceSummary,
+        glossy: bool,
+        origin: Origin,
+    ) -> Reference {
+        let regions = regions(run.world, view);
+        let (irradiance_indirect_mean, standard_error_mean) = layers.means(|i| regions[i].is_some());
+        let summary = ReferenceSummary { irradiance_indirect_mean, standard_error_mean, ..summary };
+        Reference { layers, regions, summary, glossy, origin }
+    }
+
+    /// Writes all that there is of the reference. A file is copied as it is, with what else it holds; onto itself it stays.
+    pub fn write_exr(&self, path: &Path) -> Result<()> {
+        let source = match &self.origin {
+            Origin::Traced(traced, identity) => return Ok(traced.write(path, identity)?),
+            Origin::File(source) => source,
+        };
+        if let (Ok(from), Ok(to)) = (source.canonicalize(), path.canonicalize())
+            && from == to
+        {
+            return Ok(());
+        }
+        let bytes = fs::read(source).with_context(|| format!("cannot read {} again", source.display()))?;
+        write_atomically(path, |file| file.write_all(&bytes))?;
+        Ok(())
+    }
+}
+
+/// Refuses a file that says it is of another picture. Files of other programs do not say.
+fn check_file(run: &Run, camera: &Camera, view: &View, path: &Path, image: &LayeredImage) -> Result<()> {
+    let identity = Identity::new(run.world, camera, view.width, view.height, &ReferenceSettings::default());
+    let Some(what) = identity.other_picture(image) else { return Ok(()) };
+    let message = format!("--reference-image: {} is of another {what} than the pictures", path.display());
+    if run.args.allow_scene_change && what.starts_with("scene") {
+        run.console.warn(message);
+        return Ok(());
+    }
+    bail!("{message}; make it anew with `lightprobe reference`, or give the arguments that it was made with")
+}

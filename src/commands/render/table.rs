@@ -1,0 +1,152 @@
+//! A render's report for people.
+
+use super::PATH_RAY;
+use crate::report::baked::BakedReport;
+use crate::report::error::{ErrorReport, Measured};
+use crate::report::format;
+use crate::report::render::{MethodReport, RenderReport};
+use crate::report::table::{Column, Table};
+
+/// One camera's table, and in words where the errors lie.
+pub fn table(report: &RenderReport) -> String {
+    let mut table = Table::new(&[
+        ("method", Column::Text),
+        ("visibility", Column::Text),
+        ("shade", Column::Number),
+        ("rays", Column::Number),
+        ("look-up", Column::Number),
+        ("memory per probe", Column::Number),
+        ("leak light", Column::Number),
+        ("leak dark", Column::Number),
+        ("hidden share", Column::Number),
+        ("irradiance", Column::Number),
+        ("error (rmse)", Column::Number),
+    ]);
+    let percent = |share: Option<f64>| share.map_or(format::UNDEFINED.to_owned(), format::percent);
+    let mean = report.reference.as_ref().and_then(|r| r.irradiance_indirect_mean);
+    for method in &report.methods {
+        let error = errors_of(method).map(|e| relative_rmse(&e.all, mean));
+        table.push([
+            if method.name == PATH_RAY { "path-traced probes" } else { "probes" }.to_owned(),
+            visibility(method).to_owned(),
+            format::seconds(method.shade_ms.median / 1e3),
+            format::seconds(method.ray_ms / 1e3),
+            method.lookup_ns.map_or(format::UNDEFINED.to_owned(), |ns| format::seconds(ns / 1e9)),
+            format::bytes(method.bytes_per_probe.round() as u64),
+            percent(method.leak.light),
+            percent(method.leak.dark),
+            percent(method.leak.fraction),
+            method.irradiance_indirect_mean.map_or(format::UNDEFINED.to_owned(), |e| format::significant(e, 4)),
+            error.unwrap_or_else(|| format::UNDEFINED.to_owned()),
+        ]);
+    }
+    let mut text = format!(
+        "camera {}, {}×{}, exposure {:+.2} EV, {} of the points see no probe\n{table}",
+        report.camera,
+        report.width,
+        report.height,
+        report.exposure_ev,
+        format::percent(report.methods.first().map_or(0.0, |m| m.leak.unseen)),
+    );
+    for line in error_lines(report, mean) {
+        text.push('\n');
+        text.push_str(&line);
+    }
+    text
+}
+
+/// Against whichever transport the reference has: a run has only one.
+fn errors_of(method: &MethodReport) -> Option<&ErrorReport> {
+    method.error.as_ref().or(method.error_gltf.as_ref())
+}
+
+fn visibility(method: &MethodReport) -> &'static str {
+    if method.name == PATH_RAY { "ray" } else { method.name.trim_start_matches("visibility_") }
+}
+
+/// A method in a sentence.
+fn label(method: &MethodReport) -> &'static str {
+    if method.name == PATH_RAY { "path-traced probes" } else { visibility(method) }
+}
+
+/// Root mean square error ÷ mean irradiance of the reference, with the standard error that its noise gives it. Where the reference is
+/// black, in W·m⁻².
+fn relative_rmse(measured: &Measured, mean: Option<f64>) -> String {
+    let Some(rmse) = measured.figures.rmse else { return format::UNDEFINED.to_owned() };
+    let error = measured.standard_error.rmse;
+    match mean.filter(|mean| *mean > 0.0) {
+        Some(mean) => format!("{} %", format::with_error(100.0 * rmse / mean, error.map(|e| 100.0 * e / mean))),
+        None => format!("{} W·m⁻²", format::with_error(rmse, error)),
+    }
+}
+
+/// Picks one region's figures.
+type Part = fn(&ErrorReport) -> &Measured;
+
+/// What the error is relative to, each region's errors, and what speaks against relying on them.
+fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {
+    let Some(reference) = &report.reference else { return Vec::new() };
+    let errors: Vec<(&str, &ErrorReport)> =
+        report.methods.iter().filter_map(|m| Some((label(m), errors_of(m)?))).collect();
+    let Some((_, first)) = errors.first() else { return Vec::new() };
+    let glossy = report.methods.iter().any(|m| m.error_gltf.is_some());
+    let transport = if glossy { " (glossy, as probes are not)" } else { "" };
+    let difference = format!("error: root mean square difference from the reference{transport}");
+    let mut lines = vec![match mean.filter(|mean| *mean > 0.0) {
+        Some(mean) => {
+            let noise = reference.standard_error_mean.map_or_else(String::new, |error| {
+                format!("; a pixel of it is known to {} on average", format::percent(error / mean))
+            });
+            format!("{difference} ÷ its mean, {} W·m⁻²{noise}", format::significant(mean, 4))
+        }
+        None => format!("{difference}, which is black"),
+    }];
+    let regions: [(&str, Part); 2] = [("in corners", |e| &e.by_region.corner), ("elsewhere", |e| &e.by_region.flat)];
+    for (name, region) in regions {
+        let pixels = region(first).pixels;
+        if pixels == 0 {
+            continue;
+        }
+        let share = format::percent(pixels as f64 / first.all.pixels.max(1) as f64);
+        let figures: Vec<String> =
+            errors.iter().map(|(visibility, e)| format!("{visibility} {}", relative_rmse(region(e), mean))).collect();
+        lines.push(format!("  {name} ({share} of the picture's surfaces): {}", figures.join(", ")));
+    }
+    lines.extend(verdicts(&errors));
+    lines.extend(report.baked.as_ref().map(baked_line));
+    lines
+}
+
+/// What is wrong with the probes themselves.
+fn baked_line(baked: &BakedReport) -> String {
+    let BakedReport { figures, standard_error, .. } = baked;
+    let percent = |value: Option<f64>, error: Option<f64>| match value {
+        Some(value) => format!("{} %", format::with_error(100.0 * value, error.map(|e| 100.0 * e))),
+        None => format::UNDEFINED.to_owned(),
+    };
+    format!(
+        "probes against path-traced ones: bias {}, excess {}, loss {} of their irradiance; the rest of the error is interpolation",
+        percent(figures.bias, standard_error.bias),
+        percent(figures.light, standard_error.light),
+        percent(figures.dark, standard_error.dark),
+    )
+}
+
+/// Each verdict once, with the methods and regions that it is about.
+fn verdicts(errors: &[(&str, &ErrorReport)]) -> Vec<String> {
+    let mut found: Vec<(&str, Vec<String>)> = Vec::new();
+    for (visibility, error) in errors {
+        let regions = [(" in corners", &error.by_region.corner), (" elsewhere", &error.by_region.flat)];
+        // What holds of the whole picture need not be said of its parts.
+        let of_parts = regions.into_iter().filter(|(_, part)| part.verdict != error.all.verdict);
+        for (place, measured) in [("", &error.all)].into_iter().chain(of_parts) {
+            let Some(verdict) = measured.verdict else { continue };
+            let about = format!("{visibility}{place}");
+            match found.iter_mut().find(|(known, _)| *known == verdict) {
+                Some((_, list)) => list.push(about),
+                None => found.push((verdict, vec![about])),
+            }
+        }
+    }
+    found.into_iter().map(|(verdict, about)| format!("  {verdict} ({})", about.join(", "))).collect()
+}

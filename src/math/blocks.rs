@@ -1,0 +1,240 @@
+//! Points that cover their domain evenly, in blocks of sixteen.
+//!
+//! Inside a block every pair of dimensions has an Owen-scrambled (0,2)-sequence of its own, in an order of its own
+//! ("padding": Kollig & Keller 2002, Burley, *Practical Hash-based Owen Scrambling*, JCGT 9(4), 2020): in each pair one
+//! point lies in every elementary interval of area 1/16 (1 × 16, 2 × 8, 4 × 4, …), and the first 2, 4 and 8 points are
+//! as even. Blocks are independent of each other. So the spread between the means of blocks is an honest measure of
+//! the error, which the spread between the points is not (it overestimates, as it knows nothing of the strata); and a
+//! run of more blocks continues a shorter one.
+//!
+//! With sixteen points Owen's scrambling needs no approximation by hashing permutations. It flips every bit of a
+//! coordinate by a random bit of its own for every value of the bits above it. Four bits tell the points apart, which
+//! takes 1 + 2 + 4 + 8 = 15 random bits ([`scrambled`]); below them each point is alone and has bits of its own.
+
+use glam::Vec2;
+
+use super::random::{Numbers, Purpose, Random, mix, unit_from_bits};
+
+/// Points in a block.
+pub const BLOCK: u32 = 16;
+
+/// Bits that tell the points of a block apart.
+const BITS: u32 = BLOCK.ilog2();
+
+/// Random bits that scrambling takes.
+const TREE_BITS: u32 = BLOCK - 1;
+
+/// Odd constants that spread counters over 64 bits: the fractional parts of the golden ratio and of √2, × 2⁶⁴.
+const PAIR_STEP: u64 = 0x9E37_79B9_7F4A_7C15;
+const INDEX_STEP: u64 = 0x6A09_E667_F3BC_C909;
+
+/// Sixteen points in any number of dimensions.
+#[derive(Debug, Clone, Copy)]
+pub struct Block {
+    key: u64,
+}
+
+impl Block {
+    /// Named as streams of [`Random`] are: blocks of different names are independent.
+    pub fn new(seed: u64, purpose: Purpose, a: u64, b: u64) -> Block {
+        let mut random = Random::new(seed, purpose, a, b);
+        let high = u64::from(random.bits());
+        Block { key: (high << 32) | u64::from(random.bits()) }
+    }
+
+    /// Point `index` < [`BLOCK`], at its first dimension.
+    pub fn sample(&self, index: u32) -> BlockSample {
+        debug_assert!(index < BLOCK);
+        BlockSample { key: self.key, index, pair: 0, second: None }
+    }
+}
+
+/// One point of a [`Block`], read dimension by dimension.
+#[derive(Debug, Clone)]
+pub struct BlockSample {
+    key: u64,
+    index: u32,
+    /// Number of the next pair of dimensions.
+    pair: u32,
+    /// The pair's second dimension, where only the first was used.
+    second: Option<u32>,
+}
+
+impl BlockSample {
+    /// Goes on at pair `pair`, so that decisions keep their dimensions whatever was drawn before.
+    #[inline]
+    pub fn seek(&mut self, pair: u32) {
+        self.pair = pair;
+        self.second = None;
+    }
+
+    /// A word for decisions by hashing ([`crate::trace::Ray::salt`]); takes no dimension.
+    #[inline]
+    pub fn salt(&self) -> u32 {
+        (self.key as u32) ^ (self.index << 28) ^ self.pair.wrapping_mul(PAIR_STEP as u32)
+    }
+
+    #[inline]
+    fn next_pair(&mut self) -> [u32; 2] {
+        let scramble = mix(self.key ^ u64::from(self.pair + 1).wrapping_mul(PAIR_STEP));
+        let below = mix(scramble ^ u64::from(self.index + 1).wrapping_mul(INDEX_STEP));
+        self.pair += 1;
+        let index = scrambled(self.index, scramble as u32);
+        let x = scrambled(van_der_corput(index), (scramble >> TREE_BITS) as u32);
+        let y = scrambled(sobol(index), (scramble >> (2 * TREE_BITS)) as u32);
+        // The high bits of the two halves of `below` go under the four that stratify.
+        [(x << (32 - BITS)) | (below as u32 >> BITS), (y << (32 - BITS)) | ((below >> 32) as u32 >> BITS)]
+    }
+}
+
+impl Numbers for BlockSample {
+    #[inline]
+    fn uniform(&mut self) -> f32 {
+        unit_from_bits(self.bits())
+    }
+
+    #[inline]
+    fn bits(&mut self) -> u32 {
+        if let Some(second) = self.second.take() {
+            return second;
+        }
+        let [first, second] = self.next_pair();
+        self.second = Some(second);
+        first
+    }
+
+    /// The next whole pair: a second dimension left over is passed by.
+    #[inline]
+    fn pair(&mut self) -> Vec2 {
+        self.second = None;
+        Vec2::from(self.next_pair().map(unit_from_bits))
+    }
+}
+
+/// Owen's scrambling of four bits: bit k from the top is flipped by the random bit that belongs to the bits above it.
+#[inline]
+fn scrambled(value: u32, random: u32) -> u32 {
+    let flip = |k: u32| {
+        let node = (1 << k) - 1 + (value >> (BITS - k));
+        ((random >> node) & 1) << (BITS - 1 - k)
+    };
+    value ^ (flip(0) | flip(1) | flip(2) | flip(3))
+}
+
+/// First dimension of the (0,2)-sequence: the index with its bits reversed.
+#[inline]
+fn van_der_corput(index: u32) -> u32 {
+    index.reverse_bits() >> (32 - BITS)
+}
+
+/// Second dimension (Sobol' 1967): the columns of Pascal's triangle modulo 2.
+#[inline]
+fn sobol(index: u32) -> u32 {
+    const COLUMNS: [u32; BITS as usize] = [0b1000, 0b1100, 0b1010, 0b1111];
+    let column = |k: u32| COLUMNS[k as usize] * ((index >> k) & 1);
+    column(0) ^ column(1) ^ column(2) ^ column(3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn block(b: u64) -> Block {
+        Block::new(11, Purpose::Path, 5, b)
+    }
+
+    /// Pair `pair` of the first `n` points.
+    fn points(block: Block, pair: u32, n: u32) -> Vec<Vec2> {
+        let point = |i| {
+            let mut sample = block.sample(i);
+            sample.seek(pair);
+            sample.pair()
+        };
+        (0..n).map(point).collect()
+    }
+
+    #[test]
+    fn every_elementary_interval_holds_one_point() {
+        for b in 0..50 {
+            for pair in 0..6 {
+                // Prefixes of a power of two too.
+                for n in [2u32, 4, 8, 16] {
+                    let points = points(block(b), pair, n);
+                    for columns in (0..=n.ilog2()).map(|k| 1 << k) {
+                        let rows = n / columns;
+                        let mut count = vec![0; n as usize];
+                        for p in &points {
+                            count[((p.x * columns as f32) as u32 * rows + (p.y * rows as f32) as u32) as usize] += 1;
+                        }
+                        assert!(count.iter().all(|c| *c == 1), "{columns} × {rows}: {count:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn single_points_are_uniform() {
+        // One point of many blocks, in 8 × 8 cells: χ² of 63 degrees of freedom, mean 63 and standard deviation 11.2.
+        // Below 63 + 5 · 11.2 = 119: the χ² tail beyond it is 2e-5, and twelve are looked at.
+        for (index, pair) in [(0, 0), (0, 1), (3, 0), (3, 7), (15, 0), (15, 2)] {
+            for high in [true, false] {
+                let n = 20_000;
+                let mut count = [0f64; 64];
+                for b in 0..n {
+                    let p = points(block(b), pair, 16)[index];
+                    // The coordinates themselves, and what is below the bits that stratify.
+                    let p = if high { p } else { (p * 16.0).fract() };
+                    count[(p.x * 8.0) as usize * 8 + (p.y * 8.0) as usize] += 1.0;
+                }
+                let expected = n as f64 / 64.0;
+                let chi_squared: f64 = count.iter().map(|c| (c - expected).powi(2) / expected).sum();
+                assert!(chi_squared < 119.0, "point {index}, pair {pair}: χ² = {chi_squared}");
+            }
+        }
+    }
+
+    #[test]
+    fn blocks_and_pairs_of_dimensions_are_independent() {
+        // Correlation of the same point's coordinates in two blocks, or in two pairs of one block: over 20,000 tries
+        // its standard error is 0.007; five of them, and nine correlations are looked at.
+        let n = 20_000;
+        let x = |b: u64, pair: u32, index: usize| f64::from(points(block(b), pair, 16)[index].x) - 0.5;
+        let correlation = |f: &dyn Fn(u64) -> f64| (0..n).map(f).sum::<f64>() * 12.0 / n as f64;
+        for index in [0, 5, 15] {
+            let blocks = correlation(&|b| x(b, 0, index) * x(b + 1, 0, index));
+            let pairs = correlation(&|b| x(b, 0, index) * x(b, 1, index));
+            let far = correlation(&|b| x(b, 2, index) * x(b, 11, index));
+            assert!(blocks.abs() < 0.036 && pairs.abs() < 0.036 && far.abs() < 0.036, "{blocks} {pairs} {far}");
+        }
+    }
+
+    #[test]
+    fn block_means_tell_their_own_error() {
+        // The mean of x·y over a block: exact 1/4. The spread of 4000 block means predicts the error of their mean, and
+        // lies far below that of sixteen independent points, 7/144/16.
+        let means: Vec<f64> = (0..4000)
+            .map(|b| points(block(b), 3, 16).iter().map(|p| f64::from(p.x * p.y)).sum::<f64>() / 16.0)
+            .collect();
+        let n = means.len() as f64;
+        let mean = means.iter().sum::<f64>() / n;
+        let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        // Four standard errors: 6e-5 of a normal distribution lies beyond.
+        assert!((mean - 0.25).abs() < 4.0 * (variance / n).sqrt(), "{mean}");
+        assert!(variance < 0.05 * 7.0 / 144.0 / 16.0, "{variance}");
+    }
+
+    #[test]
+    fn seeking_and_halves_keep_dimensions_apart() {
+        let mut a = block(0).sample(7);
+        let (x, y) = (a.uniform(), a.uniform());
+        let mut b = block(0).sample(7);
+        assert_eq!(b.pair(), Vec2::new(x, y));
+        let first = b.uniform();
+        // The other half of the pair is passed by.
+        let next = b.pair();
+        b.seek(1);
+        assert_eq!(b.pair().x, first);
+        assert_eq!(b.pair(), next);
+    }
+}

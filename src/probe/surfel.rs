@@ -1,0 +1,64 @@
+//! What a probe keeps of a hit.
+
+use glam::{Vec2, Vec3};
+
+use super::surface_visibility::Facing;
+use crate::light::surface::SurfacePoint;
+use crate::math::octahedral::oct_from_direction;
+
+/// A captured hit, in few bytes: a capture takes as long to be written to fresh memory as Embree takes for some of its
+/// rays, and every bounce reads it all.
+///
+/// Albedo and radiance are multiplied by the share of its texel's solid angle that the hit stands for, so that a texel's
+/// radiance is the sum over its surfels.
+#[derive(Debug, Clone, Copy)]
+pub struct Surfel {
+    /// Relative to the scene's origin.
+    pub position: Vec3,
+    /// B⁰: radiance reflected from light that did not pass through probes, times the share, W·m⁻²·sr⁻¹.
+    pub direct_radiance: Vec3,
+    pub texel: u32,
+    /// `oct` of the shading normal, towards the probe, in units of 1/[`NORMAL_SCALE`].
+    oct: [i16; 2],
+    /// Albedo times the share, in units of 1/[`ALBEDO_SCALE`].
+    albedo: [u16; 3],
+    /// Main direction of the geometric normal, towards the probe.
+    pub facing: Facing,
+}
+
+/// Steps of 1/32767 in `oct` are at most 10⁻⁴ rad: a thousandth of a texel of the maps that are asked.
+const NORMAL_SCALE: f32 = i16::MAX as f32;
+
+/// Steps of 1/65535 err by 10⁻⁵ of a typical albedo, upwards as often as downwards: a tenth of the solver's tolerance.
+const ALBEDO_SCALE: f32 = u16::MAX as f32;
+
+const _: () = assert!(size_of::<Surfel>() == 40);
+
+impl Surfel {
+    pub fn new(surface: &SurfacePoint, direct_radiance: Vec3, texel: u32, share: f32) -> Surfel {
+        // Adding a half before truncation rounds.
+        let oct = oct_from_direction(surface.shading_normal) * NORMAL_SCALE;
+        let albedo = surface.albedo * (share * ALBEDO_SCALE) + 0.5;
+        Surfel {
+            position: surface.position,
+            direct_radiance: direct_radiance * share,
+            texel,
+            oct: [oct.x, oct.y].map(|x| (x + 0.5f32.copysign(x)) as i16),
+            albedo: [albedo.x as u16, albedo.y as u16, albedo.z as u16],
+            facing: Facing::of(surface.geometric_normal),
+        }
+    }
+
+    /// `oct` of the shading normal.
+    #[inline]
+    pub fn oct(&self) -> Vec2 {
+        Vec2::new(f32::from(self.oct[0]), f32::from(self.oct[1])) * (1.0 / NORMAL_SCALE)
+    }
+
+    /// Albedo times the share.
+    #[inline]
+    pub fn albedo(&self) -> Vec3 {
+        let [r, g, b] = self.albedo.map(f32::from);
+        Vec3::new(r, g, b) * (1.0 / ALBEDO_SCALE)
+    }
+}

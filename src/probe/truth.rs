@@ -1,0 +1,87 @@
+//! The truth at the probes: the irradiance of a volume's probes by full paths, in a few independent runs whose spread
+//! tells how well it is known.
+//!
+//! It holds no leaks and no interpolated bounces. Against it a bake's own bias shows, apart from what interpolation
+//! between probes adds in a picture.
+
+use glam::Vec3A;
+use rayon::prelude::*;
+
+use super::Volume;
+use super::capture::{Capture, CaptureSettings, ReflectedLight};
+use super::filter::Kernel;
+use super::map::fill_with_border;
+use super::placement::ProbeState;
+use crate::light::World;
+use crate::math::octahedral::texel_direction;
+use crate::progress::Progress;
+
+/// Independent runs. Standard errors from eight are known to a quarter (1/√14).
+pub const RUNS: u64 = 8;
+
+/// Keeps the runs' random numbers apart from the bake's own, and from each other.
+const SEED_STEP: u64 = 0x5851_F42D_4C95_7F2D;
+
+/// A volume's probes lit by full paths.
+pub struct Truth {
+    /// Of every run, of every probe: interior texels row by row, W·m⁻²; empty for probes that are not active.
+    pub runs: Vec<Vec<Vec<Vec3A>>>,
+    /// The mean of the runs, with all else of the volume that it is the truth of.
+    pub volume: Volume,
+}
+
+impl Truth {
+    /// Traces `paths` paths in every run from each of the capture's hits; emitters, resolution and filter are those of
+    /// `settings`.
+    pub fn trace(
+        world: &World,
+        settings: &CaptureSettings,
+        volume: &Volume,
+        paths: u32,
+        seed: u64,
+        progress: Progress,
+    ) -> Truth {
+        let settings = CaptureSettings { reflected: ReflectedLight::PathTraced { paths }, ..settings.clone() };
+        let maps = &volume.irradiance;
+        let kernel = Kernel::cosine(settings.resolution, maps.resolution);
+        let bar = progress.stage("path-traced probes", RUNS as usize * volume.active_count());
+        let run = |run: u64| -> Vec<Vec<Vec3A>> {
+            let capture = Capture {
+                world,
+                settings: &settings,
+                distance_clamp_m: None,
+                // Divides samples between techniques; any division has the same mean.
+                emitter_coverage: 0.0,
+                seed: seed.wrapping_add((run + 1).wrapping_mul(SEED_STEP)),
+            };
+            let probe = |p: usize| -> Vec<Vec3A> {
+                if volume.states[p] != ProbeState::Active {
+                    return Vec::new();
+                }
+                let traced = capture.probe(p, volume.positions[p], |_| true);
+                bar.inc(1);
+                let mut radiance = traced.emitted_radiance();
+                traced.surfels.iter().for_each(|s| radiance[s.texel as usize] += Vec3A::from(s.direct_radiance));
+                let mut irradiance = vec![Vec3A::ZERO; kernel.rows()];
+                kernel.irradiance(&radiance, &mut irradiance);
+                for (o, value) in irradiance.iter_mut().enumerate() {
+                    let normal = texel_direction(o % maps.resolution, o / maps.resolution, maps.resolution);
+                    *value += Vec3A::from(traced.sampled_emitter_irradiance(normal));
+                }
+                irradiance
+            };
+            (0..volume.states.len()).into_par_iter().map(probe).collect()
+        };
+        let runs: Vec<Vec<Vec<Vec3A>>> = (0..RUNS).map(run).collect();
+        bar.finish_and_clear();
+        let mut volume = volume.clone();
+        for p in (0..volume.states.len()).filter(|&p| volume.states[p] == ProbeState::Active) {
+            let texels = runs[0][p].len();
+            let mean = |o: usize| runs.iter().map(|run| run[p][o]).sum::<Vec3A>() / RUNS as f32;
+            let encoded: Vec<Vec3A> = (0..texels).map(|o| volume.curve.encode(mean(o))).collect();
+            let (resolution, border) = (volume.irradiance.resolution, volume.irradiance.border);
+            fill_with_border(&encoded, resolution, border, volume.irradiance.probe_mut(p));
+        }
+        Truth { runs, volume }
+    }
+}

@@ -1,0 +1,95 @@
+//! What is wrong with the probes themselves, before anything is interpolated between them: their irradiance against the
+//! same probes' by full paths.
+
+use glam::Vec3A;
+use serde::Serialize;
+
+use super::error::terms::fold;
+use crate::math::color::luminance;
+use crate::math::octahedral::{solid_angle_density, texel_centre};
+use crate::probe::Volume;
+use crate::probe::truth::Truth;
+
+/// Sums run over all texels of active probes by their solid angle, in luminance. All are shares of ΣE_path.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct BakedFigures {
+    /// Σ(E − E_path): positive where the bake is too bright.
+    pub bias: Option<f64>,
+    /// Σ max(0, E − E_path): light that leaked into probes, and all other excess.
+    pub light: Option<f64>,
+    /// Σ max(0, E_path − E): light that the bake lost.
+    pub dark: Option<f64>,
+}
+
+/// The probes of a file against the truth.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BakedReport {
+    #[serde(flatten)]
+    pub figures: BakedFigures,
+    /// From the spread between independent runs of the truth (jackknife).
+    pub standard_error: BakedFigures,
+    /// Paths from every captured hit, all runs together.
+    pub paths_per_hit: u64,
+    pub time_s: f64,
+}
+
+/// Sums from which the figures follow.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    difference: f64,
+    over: f64,
+    under: f64,
+    truth: f64,
+}
+
+/// Compares `volume` with the truth at its probes. The noise of the truth, which would pass for excess and for loss
+/// alike, is taken out to first order ([`fold`]).
+pub fn measure(volume: &Volume, truth: &Truth) -> (BakedFigures, BakedFigures) {
+    let runs = truth.runs.len();
+    let all = figures(volume, truth, None);
+    let left_out: Vec<BakedFigures> = (0..runs).map(|run| figures(volume, truth, Some(run))).collect();
+    // Efron's jackknife: (n − 1)/n · Σ(θ₋ᵢ − mean)².
+    let error = |of: fn(&BakedFigures) -> Option<f64>| {
+        let values: Option<Vec<f64>> = left_out.iter().map(of).collect();
+        let values = values?;
+        let mean = values.iter().sum::<f64>() / runs as f64;
+        let sum: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
+        Some((sum * (runs - 1) as f64 / runs as f64).sqrt())
+    };
+    (all, BakedFigures { bias: error(|f| f.bias), light: error(|f| f.light), dark: error(|f| f.dark) })
+}
+
+/// The figures against all runs of the truth but one.
+fn figures(volume: &Volume, truth: &Truth, without: Option<usize>) -> BakedFigures {
+    let maps = &volume.irradiance;
+    let (resolution, border, side) = (maps.resolution, maps.border, maps.side());
+    let used: Vec<usize> = (0..truth.runs.len()).filter(|&run| Some(run) != without).collect();
+    let n = used.len() as f64;
+    let mut sums = Sums::default();
+    for p in 0..volume.states.len() {
+        let texels = truth.runs[0][p].len();
+        // Per texel: solid angle, difference, variance of the truth's mean.
+        let mut found = Vec::with_capacity(texels);
+        for o in 0..texels {
+            let (column, row) = (o % resolution, o / resolution);
+            let oct = glam::Vec2::new(texel_centre(column, resolution), texel_centre(row, resolution));
+            let weight = f64::from(solid_angle_density(oct));
+            let stored = volume.curve.decode(maps.probe(p)[(row + border) * side + column + border]);
+            let of = |e: Vec3A| f64::from(luminance(e.into()));
+            let mean = used.iter().map(|&run| of(truth.runs[run][p][o])).sum::<f64>() / n;
+            let spread = used.iter().map(|&run| (of(truth.runs[run][p][o]) - mean).powi(2)).sum::<f64>();
+            found.push((weight, of(stored) - mean, spread / (n * (n - 1.0))));
+            sums.truth += weight * mean;
+        }
+        // How large differences are, from all of the probe's texels: that of one is as noisy as itself.
+        let size = found.iter().map(|(_, d, v)| d * d - v).sum::<f64>() / texels.max(1) as f64;
+        for (weight, d, v) in found {
+            let folded = fold(d, size.max(0.0).sqrt(), v) / 2.0;
+            sums.difference += weight * d;
+            sums.over += weight * (d.max(0.0) - folded);
+            sums.under += weight * ((-d).max(0.0) - folded);
+        }
+    }
+    let share = |sum: f64| (sums.truth > 0.0).then(|| sum / sums.truth);
+    BakedFigures { bias: share(sums.difference), light: share(sums.over.max(0.0)), dark: share(sums.under.max(0.0)) }
+}

@@ -1,0 +1,122 @@
+//! From what the reference accumulates to the layers of its picture.
+
+use glam::Vec3;
+
+use super::film::{Film, Quantity};
+use super::layers::{compose, to_pixels};
+use super::points::{ImagePoint, View, has_blend};
+use crate::image::LayeredImage;
+use crate::light::World;
+use crate::light::bsdf::{Bsdf, Transport};
+use crate::light::lambert::reflected_radiance;
+
+/// Names of the layers of variances.
+pub const BEAUTY_VARIANCE: &str = "beauty_variance";
+pub const IRRADIANCE_INDIRECT_VARIANCE: &str = "irradiance_indirect_variance";
+
+/// What is accumulated where pixels show one point each, and where they show several.
+const LAMBERT: &[Quantity] = &[Quantity::IrradianceIndirect];
+const GLTF: &[Quantity] = &[Quantity::IrradianceIndirect, Quantity::Beauty, Quantity::Indirect, Quantity::Glossy];
+const BLENDED: &[Quantity] = &[
+    Quantity::IrradianceIndirect,
+    Quantity::Beauty,
+    Quantity::Indirect,
+    Quantity::Emission,
+    Quantity::Direct,
+    Quantity::IrradianceDirect,
+    Quantity::Albedo,
+    Quantity::Normal,
+    Quantity::Depth,
+];
+const BLENDED_GLTF: &[Quantity] = &[
+    Quantity::IrradianceIndirect,
+    Quantity::Beauty,
+    Quantity::Indirect,
+    Quantity::Glossy,
+    Quantity::Emission,
+    Quantity::Direct,
+    Quantity::IrradianceDirect,
+    Quantity::Albedo,
+    Quantity::Normal,
+    Quantity::Depth,
+];
+
+/// What pixels show that show one point each.
+pub(super) struct FixedView {
+    pub view: View,
+    /// Per pixel; `NO_POINT` for the sky.
+    pub point_of_pixel: Vec<u32>,
+    /// Radiance that each point reflects of punctual lights.
+    pub direct: Vec<Vec3>,
+}
+
+pub(super) const NO_POINT: u32 = u32::MAX;
+
+/// What has to be accumulated in this world.
+pub fn quantities(world: &World, transport: Transport) -> &'static [Quantity] {
+    match (has_blend(world), transport) {
+        (false, Transport::Lambert) => LAMBERT,
+        (false, Transport::Gltf) => GLTF,
+        (true, Transport::Lambert) => BLENDED,
+        (true, Transport::Gltf) => BLENDED_GLTF,
+    }
+}
+
+/// Radiance that a point reflects of punctual lights, W·m⁻²·sr⁻¹.
+pub(super) fn direct_radiance(world: &World, point: &ImagePoint, transport: Transport, salt: u32) -> Vec3 {
+    match transport {
+        Transport::Lambert => reflected_radiance(point.surface.albedo, point.irradiance_direct),
+        Transport::Gltf => {
+            let bsdf = Bsdf::new(world, &point.surface, point.normal, point.view, transport);
+            world.punctual_radiance(&point.surface, &bsdf, salt)
+        }
+    }
+}
+
+/// All layers where pixels show one point each.
+pub(super) fn develop_fixed(film: &Film, fixed: &FixedView) -> LayeredImage {
+    let view = &fixed.view;
+    let pixels = film.mean(Quantity::IrradianceIndirect).unwrap_or_default();
+    let at_points: Vec<Vec3> = view.points.iter().map(|p| pixels[p.pixel as usize]).collect();
+    let mut image = compose(view, &at_points);
+    if film.quantities() == GLTF {
+        for quantity in [Quantity::Beauty, Quantity::Indirect, Quantity::Glossy] {
+            image.push(quantity.name(), film.mean(quantity).unwrap_or_default());
+        }
+        image.push(Quantity::Direct.name(), to_pixels(view, |i, _| fixed.direct[i]));
+        push_variances(film, &mut image);
+    } else if let Some(variance) = film.variance(Quantity::IrradianceIndirect) {
+        let mut beauty = vec![Vec3::ZERO; variance.len()];
+        for p in &view.points {
+            // A reflected radiance is linear in the irradiance, so its variance is scaled by the square.
+            let factor = reflected_radiance(p.surface.albedo, Vec3::ONE);
+            beauty[p.pixel as usize] = variance[p.pixel as usize] * factor * factor;
+        }
+        image.push(BEAUTY_VARIANCE, beauty);
+        image.push(IRRADIANCE_INDIRECT_VARIANCE, variance);
+    }
+    image
+}
+
+/// All layers where everything is an average.
+pub(super) fn develop_blended(film: &Film, width: u32, height: u32) -> LayeredImage {
+    let mut image = LayeredImage::new(width, height);
+    for &quantity in film.quantities() {
+        if let Some(mean) = film.mean(quantity) {
+            image.push(quantity.name(), mean);
+        }
+    }
+    push_variances(film, &mut image);
+    image
+}
+
+/// Variances as they were accumulated.
+fn push_variances(film: &Film, image: &mut LayeredImage) {
+    for (quantity, name) in
+        [(Quantity::Beauty, BEAUTY_VARIANCE), (Quantity::IrradianceIndirect, IRRADIANCE_INDIRECT_VARIANCE)]
+    {
+        if let Some(variance) = film.variance(quantity) {
+            image.push(name, variance);
+        }
+    }
+}

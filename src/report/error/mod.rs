@@ -10,7 +10,7 @@
 //! | `relmse` | Σ(d²/(r² + ε))/M, ε = 10⁻²·mean(r)² | [`terms::relative_square`]; d² − v where noise is small |
 //! | `mae` | Σ\|d\|/M | Σ(\|d\| − b)/M with the folded normal's b, [`terms::fold`] |
 //! | `over`, `under` | Σmax(0, ±d)/M | Σ(max(0, ±d) − b/2)/M |
-//! | `psnr_db` | 20·log₁₀(peak/rmse) | through `rmse` |
+//! | `psnr_db` | 20·log₁₀(peak/rmse) | through `rmse`; the peak's noise is in the standard error |
 //! | `flip` | mean of LDR-FLIP's map | [`flip`] |
 //!
 //! The peak is the largest value of the reference, as is usual for pictures without a largest possible one.
@@ -127,6 +127,7 @@ pub fn measure(
     let usable = |i: usize| regions[i].is_some() && irradiance[i].is_finite() && reference.is_finite(i);
     let mask: Vec<bool> = (0..irradiance.len()).map(usable).collect();
     let (epsilon, peak) = scale(reference, &mask);
+    let peak_error = peak_error(reference, &mask, peak);
     let around = look_around(reference, irradiance, &mask);
 
     // The whole picture, corners, flat parts.
@@ -139,7 +140,7 @@ pub fn measure(
     }
     let finish = |part: usize| {
         let flip = flips.map(|f| f.parts[part]).unwrap_or_default();
-        sums[part].finish(reference.noise.is_some(), epsilon, peak, flip)
+        sums[part].finish(reference.noise.is_some(), epsilon, (peak, peak_error), flip)
     };
     ErrorReport {
         all: finish(0),
@@ -150,8 +151,20 @@ pub fn measure(
     }
 }
 
-/// ε of `relmse` and the peak of `psnr_db`. Both are taken as exact: the noise of a mean over all pixels does not show beside that
-/// of the figures, and the peak is a convention.
+/// The largest of many noisy values is so partly by chance: of 10⁴ equal ones by 3.7 deviations, of fewer candidates by
+/// less.
+const PEAK_SIGMAS: f64 = 3.0;
+
+/// By how much the peak may be wrong: as many deviations of the pixel and channel that it was found in.
+fn peak_error(reference: &ReferenceLayers, mask: &[bool], peak: f64) -> f64 {
+    let Some(noise) = &reference.noise else { return 0.0 };
+    let channels = (0..mask.len()).filter(|&i| mask[i]).flat_map(|i| [0, 1, 2].map(|c| (i, c)));
+    let mut at_peak = channels.filter(|&(i, c)| f64::from(reference.irradiance[i][c]) == peak);
+    at_peak.next().map_or(0.0, |(i, c)| PEAK_SIGMAS * noise.between(i, c, c).sqrt())
+}
+
+/// ε of `relmse` and the peak of `psnr_db`. The former is taken as exact: the noise of a mean over all pixels does not show
+/// beside that of the figures.
 fn scale(reference: &ReferenceLayers, mask: &[bool]) -> (f64, f64) {
     let (mut sum, mut count, mut peak) = (0.0, 0.0f64, 0.0f64);
     for (pixel, _) in reference.irradiance.iter().zip(mask).filter(|(_, used)| **used) {
@@ -224,7 +237,7 @@ impl Sums {
         self.noise += v.iter().sum::<f64>();
     }
 
-    fn finish(&self, noise_known: bool, epsilon: f64, peak: f64, flip: flip::Flip) -> Measured {
+    fn finish(&self, noise_known: bool, epsilon: f64, (peak, peak_error): (f64, f64), flip: flip::Flip) -> Measured {
         if self.pixels == 0 {
             let (figures, standard_error) = Default::default();
             return Measured { pixels: 0, figures, standard_error, noise_rms: None, verdict: None };
@@ -256,7 +269,8 @@ impl Sums {
             bias: error(&self.bias, 0.0),
             over: error(&self.over, folded / 2.0),
             under: error(&self.under, folded / 2.0),
-            psnr_db: psnr(0.0).and(known(10.0 / std::f64::consts::LN_10 * square_error / square)),
+            psnr_db: psnr(0.0)
+                .and(known(10.0 / std::f64::consts::LN_10 * (square_error / square).hypot(2.0 * peak_error / peak))),
             flip: flip.standard_error,
         };
         let noise = self.noise / samples;

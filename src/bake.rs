@@ -16,7 +16,7 @@ use crate::config::{Config, PlanMode};
 use crate::light::World;
 use crate::memory::TooLittleMemory;
 use crate::plan::Plan;
-use crate::probe::capture::{Capture, EmissionTransport, ProbeCapture};
+use crate::probe::capture::{Capture, EmissionTransport, ProbeCapture, ReflectedLight};
 use crate::probe::checkpoint;
 use crate::probe::container::{Container, FileError};
 use crate::probe::file::{self, EncodingLosses, SceneRecord};
@@ -266,7 +266,7 @@ impl Prepared<'_, '_> {
         }
         let mut saved = Ok(());
         let mut last_saved = Instant::now();
-        let solution = solver.solve(&mut volume, progress, |progress, volume| {
+        let mut solution = solver.solve(&mut volume, progress, |progress, volume| {
             bar.set_position(progress.bounces.len() as u64);
             let residual = progress.bounces.last().map_or(0.0, |b| b.residual);
             bar.set_message(format!("residual {residual:.1e}"));
@@ -281,6 +281,8 @@ impl Prepared<'_, '_> {
         bar.finish_and_clear();
         saved?;
         times.bounces = started.elapsed().as_secs_f64();
+        // Full paths leave nothing to bounce.
+        solution.converged |= matches!(config.capture.reflected, ReflectedLight::PathTraced { .. });
         numerics.non_finite += solution.non_finite;
         let done = solution.bounces.len().saturating_sub(1) as u32;
         let mut plan = self.plan.clone();

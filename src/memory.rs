@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use crate::cli::Size;
 use crate::report::format;
 
 /// A run needs more memory than there is.
@@ -21,6 +22,21 @@ pub struct TooLittleMemory {
 /// of its own limit of address space. `None` where the system does not say.
 pub fn available_bytes() -> Option<u64> {
     [machine(), control_groups(), address_space()].into_iter().flatten().min()
+}
+
+/// Refuses pictures of this size where they take more memory than there is.
+pub fn check_memory(Size { width, height }: Size, bytes_per_pixel: f64) -> Result<(), TooLittleMemory> {
+    let needed = (f64::from(width) * f64::from(height) * bytes_per_pixel) as u64;
+    match available_bytes() {
+        Some(available) if needed > available => Err(TooLittleMemory {
+            key: format!("--size {width}x{height}"),
+            what: "the pictures",
+            needed,
+            available,
+            remedy: "choose a smaller size",
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// Bytes of this process in memory now.

@@ -14,17 +14,24 @@ use crate::light::World;
 use crate::light::bsdf::Transport;
 use crate::light::path::Strategy;
 use crate::math::blocks::BLOCK;
+use crate::memory::check_memory;
 use crate::output::{Named, check_outputs};
 use crate::report::format;
 use crate::report::header::Header;
 use crate::report::reference::{NoiseReport, Rays, ReferenceReport, ReferenceTimes, SCHEMA};
 use crate::report::table::{Column, Table};
 use crate::shade::film::Noise;
+use crate::shade::points::has_blend;
 use crate::shade::reference::{ReferenceSettings, State, Tracing};
 use crate::shade::reference_file::{Identity, resume};
 
 /// How much work a kill may lose.
 const SAVE_INTERVAL: Duration = Duration::from_secs(60);
+
+/// Memory that a reference takes at its peak, per pixel: measured at 960 × 540, rounded up; the second where all layers
+/// are accumulated, with translucent surfaces or glossy ones.
+const PIXEL_BYTES: f64 = 850.0;
+const LAYERED_PIXEL_BYTES: f64 = 2000.0;
 
 pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
     if args.view.camera.as_deref() == Some("all") {
@@ -63,6 +70,8 @@ pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
     let found = cameras(&args.view, &world, console)?;
     let Some(camera) = found.first() else { bail!("there is no camera; use --look-at") };
     let size = args.view.size;
+    let layered = settings.transport == Transport::Gltf || has_blend(&world);
+    check_memory(size, if layered { LAYERED_PIXEL_BYTES } else { PIXEL_BYTES })?;
     let identity = Identity::new(&world, camera, size.width, size.height, &settings);
     let previous = previous(args, &identity, &world, &settings, console)?;
     let (spp_resumed, rays_before) = previous.as_ref().map_or((0, 0), |p| (p.film.blocks * BLOCK, p.rays.total()));
@@ -167,7 +176,7 @@ fn summary(report: &ReferenceReport, output: &Path) -> String {
     for (name, value) in [
         ("camera", format!("{}, {}×{}", report.camera, report.width, report.height)),
         ("samples per pixel", report.spp.to_string()),
-        ("irradiance", format::or_undefined(noise, |n| format::significant(n.mean, 4))),
+        ("irradiance, whole picture", format::or_undefined(noise, |n| format::significant(n.mean, 4))),
         ("standard error", format::or_undefined(noise.and_then(|n| n.relative), format::percent)),
         ("rays", millions(report.rays.primary + report.rays.shadow)),
         ("ray rate", format::or_undefined(report.rays_per_s, |r| format!("{} M/s", format::significant(r / 1e6, 3)))),

@@ -290,11 +290,12 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
     Ok(report)
 }
 
-/// Mean over image points by their share of a pixel.
+/// Mean over the pixels that show a surface.
 fn mean_luminance(view: &View, irradiance: &[Vec3]) -> Option<f64> {
-    let weight: f64 = view.points.iter().map(|p| f64::from(p.weight)).sum();
     let sum: f64 = view.points.iter().zip(irradiance).map(|(p, e)| f64::from(p.weight * luminance(*e))).sum();
-    (weight > 0.0).then(|| sum / weight)
+    // The points of a pixel stand together.
+    let pixels = view.points.chunk_by(|a, b| a.pixel == b.pixel).count();
+    (pixels > 0).then(|| sum / pixels as f64)
 }
 
 /// Exposure of the whole run: that of the reference, else of the picture with exact visibility.

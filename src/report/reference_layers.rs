@@ -26,6 +26,8 @@ pub enum ReferenceError {
     Size { found: (u32, u32), wanted: (u32, u32) },
     #[error("it has no layer '{layer}', only {found}; make it with `lightprobe reference`")]
     MissingLayer { layer: &'static str, found: String },
+    #[error("no pixel of its layer '{IRRADIANCE}' is finite and not negative; make it with `lightprobe reference`")]
+    NoIrradiance,
 }
 
 /// What the reference says about its own noise.
@@ -70,6 +72,10 @@ impl ReferenceLayers {
             ReferenceError::MissingLayer { layer, found }
         };
         let layer = |name: &str| image.layer(name).map(<[Vec3]>::to_vec);
+        let usable = |e: &Vec3| e.is_finite() && e.cmpge(Vec3::ZERO).all();
+        if image.layer(IRRADIANCE).is_some_and(|irradiance| !irradiance.iter().any(usable)) {
+            return Err(ReferenceError::NoIrradiance);
+        }
         let noise = layer(IRRADIANCE_VARIANCE).map(|variance| Noise {
             variance,
             covariance: layer(IRRADIANCE_COVARIANCE),

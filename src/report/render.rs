@@ -70,7 +70,7 @@ pub struct MethodReport {
     pub lookup_ns: Option<f64>,
     /// At run time, after the plan.
     pub bytes_per_probe: f64,
-    /// Mean over image points, luminance, W·m⁻².
+    /// Mean over the pixels that show a surface, luminance, W·m⁻².
     pub irradiance_indirect_mean: Option<f64>,
     pub leak: Leak,
     /// Against a reference of diffuse transport, as probes have it; `null` without one.

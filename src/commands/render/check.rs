@@ -7,7 +7,7 @@ use anyhow::Result;
 use crate::cli::{RenderArgs, Size};
 use crate::commands::Console;
 use crate::light::World;
-use crate::memory::{TooLittleMemory, available_bytes};
+use crate::memory::check_memory;
 use crate::output::{Named, check_apart, check_folder, check_outputs};
 use crate::scene::Camera;
 use crate::shade::outlook::Outlook;
@@ -18,6 +18,9 @@ const PIXEL_BYTES: f64 = 600.0;
 const POINT_BYTES: f64 = 200.0;
 /// Points beyond the first of a pixel stand in lists that grow by doubling.
 const FURTHER_POINT_BYTES: f64 = 700.0;
+
+/// What a traced reference takes besides.
+const REFERENCE_PIXEL_BYTES: f64 = 600.0;
 
 /// Files that a camera's folder gets.
 const PICTURES: &[&str] = &[
@@ -67,18 +70,8 @@ pub fn check_view(args: &RenderArgs, world: &World, camera: &Camera, console: &C
     if let Some(warning) = outlook.warning() {
         console.warn(format!("camera {}: {warning}", camera.name));
     }
-    let pixels = f64::from(width) * f64::from(height);
     let points = f64::from(outlook.points_per_pixel);
     let of_points = points.min(1.0) * POINT_BYTES + (points - 1.0).max(0.0) * FURTHER_POINT_BYTES;
-    let needed = (pixels * (PIXEL_BYTES + of_points)) as u64;
-    match available_bytes() {
-        Some(available) if needed > available => Err(TooLittleMemory {
-            key: format!("--size {width}x{height}"),
-            what: "the pictures",
-            needed,
-            available,
-            remedy: "choose a smaller size",
-        })?,
-        _ => Ok(()),
-    }
+    let of_reference = if args.reference.is_some() { REFERENCE_PIXEL_BYTES * points.max(1.0) } else { 0.0 };
+    Ok(check_memory(args.view.size, PIXEL_BYTES + of_points + of_reference)?)
 }

@@ -113,7 +113,7 @@ fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {
         lines.push(format!("  {name} ({share} of the picture's surfaces): {}", figures.join(", ")));
     }
     lines.extend(verdicts(&errors));
-    lines.extend(report.baked.as_ref().map(baked_line));
+    lines.extend(report.baked.as_ref().filter(|b| b.figures.bias.is_some()).map(baked_line));
     lines
 }
 

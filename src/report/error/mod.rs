@@ -232,7 +232,9 @@ impl Sums {
             for c in 0..3 {
                 let known = around.is_none_or(|a| is_continued(a.variance[c], a.square[c], epsilon));
                 let w = r[c] * r[c] + epsilon;
-                self.doubtful += if known {
+                self.doubtful += if v[c] == 0.0 {
+                    0.0
+                } else if known {
                     let corrected = relative_square(d[c], r[c], v[c], epsilon).0;
                     RELATIVE_UNCERTAINTY * (d[c] * d[c] / w - corrected).abs()
                 } else {

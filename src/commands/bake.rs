@@ -18,7 +18,7 @@ use crate::plan::Line;
 use crate::probe::checkpoint;
 use crate::probe::file::SceneRecord;
 use crate::probe::layout;
-use crate::report::bake::{BakeReport, BytesPerProbe, SCHEMA};
+use crate::report::bake::{BakeReport, BytesPerProbe, SCHEMA, SolverReport};
 use crate::report::format;
 use crate::report::header::Header;
 use crate::report::table::{Column, Table};
@@ -232,6 +232,7 @@ fn report(
         bounces: baked.solution.bounces.clone(),
         converged: baked.solution.converged,
         spectral_radius_estimate: baked.solution.spectral_radius_estimate,
+        solver: SolverReport::of(&baked.solution),
         numerics: baked.numerics.clone(),
         plan: baked.plan.lines.clone(),
     }
@@ -259,7 +260,7 @@ fn warn_about(report: &BakeReport, console: &Console) {
         ));
     }
     if !report.converged {
-        console.warn("the bounces did not converge; raise solver.max_bounces or solver.tolerance");
+        console.warn("the bounces did not converge; raise solver.max_sweeps or solver.tolerance");
     }
     for (tensor, &count) in numerics.clamped.iter().filter(|c| *c.1 > 0) {
         console.warn(format!("{count} value(s) of tensor '{tensor}' are beyond its format's range and clamped"));
@@ -275,7 +276,7 @@ fn summary(report: &BakeReport, output: &Path) -> String {
         ("probes (active)", format!("{} ({})", report.probes, report.probes_active)),
         ("rays", format!("{} M", format::significant((report.rays.primary + report.rays.shadow) as f64 / 1e6, 3))),
         ("ray rate", rate(report.rays_per_s)),
-        ("bounces", format!("{}", report.bounces.len().saturating_sub(1))),
+        ("bounces", bounces(report)),
         ("load and build", format::seconds(t.load + t.accel_build)),
         ("survey", format::seconds(t.survey)),
         ("capture", format::seconds(t.capture)),
@@ -294,6 +295,15 @@ fn summary(report: &BakeReport, output: &Path) -> String {
         ]);
     }
     format!("{}\n{}\nwrote {}", table, plan_summary(&report.plan), output.display())
+}
+
+/// How many sweeps, and what they leave.
+fn bounces(report: &BakeReport) -> String {
+    let sweeps = report.bounces.len().saturating_sub(1);
+    match report.solver.accelerated {
+        0 => sweeps.to_string(),
+        _ => format!("all, by {sweeps} sweeps"),
+    }
 }
 
 fn plan_summary(lines: &[Line]) -> String {

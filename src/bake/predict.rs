@@ -2,13 +2,13 @@
 
 use std::time::Instant;
 
-use glam::{Vec3, Vec3A};
+use glam::{Vec2, Vec3, Vec3A};
 use rayon::prelude::*;
 
 use super::memory::{EMITTED_BYTES, SURFEL_BYTES, surfels_bytes};
 use super::{Budgeted, CHUNK_BYTES, Circumstances, Prepared};
 use crate::math::fibonacci;
-use crate::memory::{TooLittleMemory, resident_bytes};
+use crate::memory::{TooLittleMemory, peak_memory_bytes, resident_bytes};
 use crate::probe::capture::ProbeCapture;
 use crate::probe::filter::Kernel;
 use crate::probe::map::OctahedralMaps;
@@ -35,6 +35,8 @@ pub struct Prediction {
     pub map_bytes: u64,
     /// What the process takes now: scene, acceleration structure, survey's tables.
     pub resident_bytes: u64,
+    /// The most that loading the scene and surveying it took: all of that is done.
+    pub survey_bytes: u64,
 }
 
 impl Prediction {
@@ -44,20 +46,30 @@ impl Prediction {
     }
 
     pub fn memory_bytes(&self) -> u64 {
-        self.capture_bytes + self.map_bytes + self.resident_bytes
+        (self.capture_bytes + self.map_bytes + self.resident_bytes).max(self.survey_bytes)
     }
 }
 
 impl Prepared<'_, '_> {
     /// Foretells time and memory from some of the probes, spread evenly.
     pub fn predict(&self, circumstances: &Circumstances) -> Prediction {
+        // Before this estimate itself takes any.
+        let (resident_bytes, survey_bytes) = (resident_bytes(), peak_memory_bytes());
         let config = self.config;
         let capture = self.capture(circumstances);
         // Large captures are alike, and few of them fit into memory.
         let fitting = (CHUNK_BYTES / surfels_bytes(config).max(1)) as usize;
         let (pilot, share) = self.pilot(fitting.clamp(1, PILOT));
+        let distance_kernel = self.distance_kernel();
         let started = Instant::now();
-        let traced: Vec<ProbeCapture> = pilot.par_iter().map(|&p| self.trace(&capture, p)).collect();
+        let trace = |&probe: &usize| {
+            let mut captured = self.trace(&capture, probe);
+            // Filtered at once, and not kept.
+            let distances = std::mem::take(&mut captured.distances);
+            std::hint::black_box(distance_kernel.as_ref().map(|kernel| kernel.distance(&distances)));
+            captured
+        };
+        let traced: Vec<ProbeCapture> = pilot.par_iter().map(trace).collect();
         let capture_s = started.elapsed().as_secs_f64() * share;
         let bytes = traced.iter().map(ProbeCapture::bytes).sum::<u64>() as f64 * share;
 
@@ -83,6 +95,9 @@ impl Prepared<'_, '_> {
             config.encoding.border,
             Vec3A::ZERO,
         );
+        let distance = distance_kernel.map(|_| {
+            OctahedralMaps::new(self.grid.probe_count(), filter.distance_resolution, config.encoding.border, Vec2::ZERO)
+        });
         let mut retraced_s = 0.0;
         let budget = circumstances.memory_budget_bytes.unwrap_or(u64::MAX);
         if bytes > 0.0 && bytes > budget as f64 {
@@ -91,11 +106,12 @@ impl Prepared<'_, '_> {
         Prediction {
             survey_s: self.survey_s,
             capture_s,
-            bounce_s: sweep.time(&self.volume(zero, None), &pilot) * share + retraced_s,
+            bounce_s: sweep.time(&self.volume(zero, distance), &pilot) * share + retraced_s,
             bounces: expected_sweeps(ratio, &config.solver),
             capture_bytes: (bytes as u64).min(budget),
             map_bytes: self.memory.standing(),
-            resident_bytes: resident_bytes(),
+            resident_bytes,
+            survey_bytes,
         }
     }
 

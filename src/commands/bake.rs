@@ -39,7 +39,7 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     let threads = set_threads(args.trace.threads)?;
 
     let started = Instant::now();
-    console.say(format!("configuration: {}", origin_of(args)));
+    tell::configuration(console, &args.config);
     let scene = load_scene(path, &args.trace, &config, console)?;
     check_apart_from(&scene, &outputs)?;
     let load_s = started.elapsed().as_secs_f64();
@@ -118,15 +118,6 @@ fn list_presets(console: &Console) -> Result<()> {
     console.print(&lines.join("\n"))
 }
 
-/// Where the configuration in effect comes from.
-fn origin_of(args: &BakeArgs) -> String {
-    let base = match (&args.config.config, &args.config.preset) {
-        (Some(path), _) => path.display().to_string(),
-        (None, preset) => format!("preset {}", preset.as_deref().unwrap_or("default")),
-    };
-    args.config.set.iter().fold(base, |text, set| format!("{text}, --set {set}"))
-}
-
 /// Probes away from the scene can be meant, for a plain below them; more often a unit or an axis is wrong.
 fn warn_about_bounds(config: &Config, scene: &Scene, console: &Console) {
     let (Some(bounds), Some((low, high))) = (config.grid.bounds, scene.mesh.bounds()) else { return };
@@ -156,6 +147,7 @@ fn dry_run(prepared: &Prepared, circumstances: &Circumstances, console: &Console
             "predicted_capture_bytes": p.capture_bytes,
             "predicted_map_bytes": p.map_bytes,
             "predicted_scene_bytes": p.resident_bytes,
+            "predicted_survey_bytes": p.survey_bytes,
             "plan": prepared.plan.lines,
         });
         return console.print(&serde_json::to_string_pretty(&report)?);
@@ -164,7 +156,7 @@ fn dry_run(prepared: &Prepared, circumstances: &Circumstances, console: &Console
     console.print(&format!(
         "{} probes, {active} of them to bake\n\
          about {}: survey {}, capture {}, {} bounces of {} each\n\
-         about {} of memory: captures {}, maps and filters {}, scene and tables {}",
+         about {} of memory: captures {}, maps and filters {}, scene and tables {}; before them, up to the survey, {}",
         prepared.grid.probe_count(),
         format::seconds(p.time_s()),
         format::seconds(p.survey_s),
@@ -175,6 +167,7 @@ fn dry_run(prepared: &Prepared, circumstances: &Circumstances, console: &Console
         format::bytes(p.capture_bytes),
         format::bytes(p.map_bytes),
         format::bytes(p.resident_bytes),
+        format::bytes(p.survey_bytes),
     ))
 }
 

@@ -21,7 +21,7 @@ use crate::math::color::luminance;
 pub struct SolverSettings {
     /// Most bounces between probes; 0 leaves only light that reaches the captured surfaces directly. `None`: all.
     pub max_bounces: Option<u32>,
-    /// Most sweeps, however many bounces are still missing.
+    /// Most sweeps where the number of bounces is not limited, however many are still missing.
     pub max_sweeps: u32,
     pub acceleration: Acceleration,
     /// Stop when the bounces still missing are estimated below this share of the largest irradiance.
@@ -61,7 +61,7 @@ impl SolverSettings {
 
     /// Bounces, or sweeps, after which there are no more.
     pub fn most(&self) -> u32 {
-        self.max_bounces.unwrap_or(u32::MAX).min(self.max_sweeps)
+        self.max_bounces.unwrap_or(self.max_sweeps)
     }
 }
 

@@ -11,6 +11,7 @@ pub mod header;
 pub mod heatmap;
 pub mod leak;
 pub mod legend;
+pub mod plot;
 pub mod probe_key;
 pub mod reference;
 pub mod reference_layers;

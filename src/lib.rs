@@ -9,7 +9,7 @@
 //! | 2 rays | [`trace`] | Embree behind one small type; the only unsafe code |
 //! | 3 light | [`light`] | what a surface sends out: one definition for bake and render |
 //! | 4 probes | [`probe`] | grid, placement, capture, solver, filter, encoding, query, file |
-//! | 5 results | [`shade`], [`report`] | pictures and figures |
+//! | 5 results | [`shade`], [`report`], [`evaluate`] | pictures and figures |
 //! | 6 edge | [`config`], [`plan`], [`cli`], [`commands`] | what was asked, what is done about it |
 #![deny(unsafe_code)]
 
@@ -17,6 +17,7 @@ pub mod bake;
 pub mod cli;
 pub mod commands;
 pub mod config;
+pub mod evaluate;
 pub mod image;
 pub mod input;
 pub mod light;

@@ -6,7 +6,8 @@ use anyhow::Result;
 use glam::Vec3;
 
 use super::reference::Reference;
-use super::{Run, Shaded};
+use super::Run;
+use crate::evaluate::Shaded;
 use crate::image::{LayeredImage, Picture8};
 use crate::math::color::luminance;
 use crate::report::colormap::Scale;

@@ -10,6 +10,7 @@
 //! | 3 light | [`light`] | what a surface sends out: one definition for bake and render |
 //! | 4 probes | [`probe`] | grid, placement, capture, solver, filter, encoding, query, file |
 //! | 5 results | [`shade`], [`report`], [`evaluate`] | pictures and figures |
+//! | 5½ series | [`sweep`] | many bakes against one reference |
 //! | 6 edge | [`config`], [`plan`], [`cli`], [`commands`] | what was asked, what is done about it |
 #![deny(unsafe_code)]
 
@@ -30,4 +31,5 @@ pub mod progress;
 pub mod report;
 pub mod scene;
 pub mod shade;
+pub mod sweep;
 pub mod trace;

@@ -79,7 +79,9 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
         check_view(args, &world, camera, console)?;
     }
     let truth = match &reference {
-        Some(Source::Trace { settings }) => Some(BakedTruth::trace(&world, &config, &volume, settings, console.progress)),
+        Some(Source::Trace { settings }) => {
+            Some(BakedTruth::trace(&world, &config, &volume, settings, console.progress))
+        }
         _ => None,
     };
     let run = Run {

@@ -16,6 +16,7 @@ pub mod probe_key;
 pub mod reference;
 pub mod reference_layers;
 pub mod render;
+pub mod sweep;
 pub mod table;
 pub mod text;
 pub mod ticks;

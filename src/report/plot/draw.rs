@@ -114,9 +114,7 @@ enum Sample {
 fn legend(chart: &Chart) -> Vec<(Sample, String)> {
     let mut entries: Vec<(Sample, String)> =
         chart.series.iter().enumerate().map(|(i, s)| (Sample::Series(i), s.name.clone())).collect();
-    entries.extend(
-        chart.guides.iter().map(|g| (Sample::Guide { series: g.series, dotted: g.dotted }, g.name.clone())),
-    );
+    entries.extend(chart.guides.iter().map(|g| (Sample::Guide { series: g.series, dotted: g.dotted }, g.name.clone())));
     let all = chart.series.iter().flat_map(|s| &s.marks);
     let left_out = all.filter(|m| !shown(chart, m)).count();
     if left_out > 0 {
@@ -198,8 +196,7 @@ impl<DB: DrawingBackend> Canvas<'_, DB> {
 
     fn series(&self, index: usize, marks: &[Mark]) -> Drawn<DB> {
         let color = color(index);
-        let mut front: Vec<(f64, f64)> =
-            marks.iter().filter(|m| m.on_front).map(|m| self.place((m.x, m.y))).collect();
+        let mut front: Vec<(f64, f64)> = marks.iter().filter(|m| m.on_front).map(|m| self.place((m.x, m.y))).collect();
         front.sort_by(|a, b| a.0.total_cmp(&b.0));
         if front.len() > 1 {
             self.line(&front, color, 1.5)?;
@@ -267,7 +264,10 @@ impl<DB: DrawingBackend> Canvas<'_, DB> {
             return Ok(());
         }
         let bottom = self.frame[1] + entries.len() as f64 * (EM + 0.7 * GAP) * s + 0.5 * GAP * s;
-        let corners = [whole((left - 0.4 * GAP * s, self.frame[1] - 0.3 * GAP * s)), whole((left + width + 0.4 * GAP * s, bottom))];
+        let corners = [
+            whole((left - 0.4 * GAP * s, self.frame[1] - 0.3 * GAP * s)),
+            whole((left + width + 0.4 * GAP * s, bottom)),
+        ];
         let style = ShapeStyle { color: GRID.to_rgba(), filled: false, stroke_width: self.stroke(1.0) };
         self.area.draw(&Rectangle::new(corners, style))
     }

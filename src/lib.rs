@@ -9,8 +9,7 @@
 //! | 2 rays | [`trace`] | Embree behind one small type; the only unsafe code |
 //! | 3 light | [`light`] | what a surface sends out: one definition for bake and render |
 //! | 4 probes | [`probe`] | grid, placement, capture, solver, filter, encoding, query, file |
-//! | 5 results | [`shade`], [`report`], [`evaluate`] | pictures and figures |
-//! | 5½ series | [`sweep`] | many bakes against one reference |
+//! | 5 results | [`shade`], [`report`], [`evaluate`], [`sweep`] | pictures and figures, series of bakes |
 //! | 6 edge | [`config`], [`plan`], [`cli`], [`commands`] | what was asked, what is done about it |
 #![deny(unsafe_code)]
 

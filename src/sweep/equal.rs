@@ -56,7 +56,8 @@ pub fn bytes(ladders: &[LadderReport], configurations: &[ConfigurationReport]) -
     let point = |c: &ConfigurationReport| Some((mean(c, "bytes")?, mean(c, "error_relative")?));
     let all = || configurations.iter().filter_map(point).map(|p| p.0).filter(|b| *b >= 1.0);
     let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max));
-    let exponents = if low <= high { low.log2().ceil() as i32..=high.log2().ceil() as i32 } else { 1..=0 };
+    // Without any, none: ∞ becomes the largest number and 0's logarithm the least.
+    let exponents = low.log2().ceil() as i32..=high.log2().ceil() as i32;
     let budget = |exponent: i32| {
         let bytes = 2f64.powi(exponent);
         let entry = |ladder: &LadderReport| {

@@ -6,6 +6,7 @@
 
 use super::SweepError;
 use super::run::{Finished, Setting};
+use crate::bake::BakeError;
 use crate::config::{Config, ConfigError};
 use crate::probe::encode::ColorFormat;
 use crate::report::sweep::{FloorCause, FloorReport, RunRecord};
@@ -96,15 +97,20 @@ pub fn measure(
     };
     let mut causes = Vec::new();
     for variant in variants(config)? {
-        let remaining = match &variant.config {
-            Some(config) => {
-                let label = format!("{label} without error of {}", variant.cause);
-                let Finished { record, .. } = setting.obtain(&label, config, seed, warn)?;
-                error_of(&record, Method::On)
-            }
-            None => all,
+        let Some(changed) = &variant.config else {
+            causes.push(cause(variant.cause, &variant.how, all));
+            step();
+            continue;
         };
-        causes.push(cause(variant.cause, &variant.how, remaining));
+        let label = format!("{label} without error of {}", variant.cause);
+        causes.push(match setting.obtain(&label, changed, seed, warn) {
+            Ok(Finished { record, .. }) => cause(variant.cause, &variant.how, error_of(&record, Method::On)),
+            // It is dearer than what was asked for.
+            Err(SweepError::Bake { cause: BakeError::Memory(little), .. }) => {
+                cause(variant.cause, &format!("{}: not measured, {little}", variant.how), None)
+            }
+            Err(other) => return Err(other),
+        });
         step();
     }
     let exact = error_of(base, Method::Ray);

@@ -234,7 +234,8 @@ fn rungs(name: &str, base: &Config, axes: &[Axis], finish: &dyn Fn(&mut Config))
 pub fn check_shared(ladders: &[Ladder]) -> Result<(), SweepError> {
     let rungs = || ladders.iter().flat_map(|ladder| &ladder.rungs);
     let Some(first) = rungs().next() else { return Ok(()) };
-    let keys: [(&'static str, fn(&Config) -> String); 3] = [
+    type Value = fn(&Config) -> String;
+    let keys: [(&'static str, Value); 3] = [
         ("lights.punctual_scale", |c| c.lights.punctual_scale.to_string()),
         ("lights.sky", |c| c.lights.sky.map_or("None".to_owned(), |sky| format!("{sky:?}"))),
         ("solver.albedo_max", |c| c.solver.albedo_max.to_string()),

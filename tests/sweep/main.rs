@@ -27,7 +27,8 @@ const COMMON: &str = "--size 32x18 --reference 32 --seeds 2";
 
 /// A sweep of the two open rooms into `folder`/`name`.
 fn arguments(folder: &Folder, name: &str, words: &str) -> Vec<String> {
-    let start = ["sweep", text(&scene("two_rooms_open")), "-o", text(&folder.path().join(name)), "--no-progress"];
+    let (scene, output) = (scene("two_rooms_open"), folder.path().join(name));
+    let start = ["sweep", text(&scene), "-o", text(&output), "--no-progress"];
     start.into_iter().chain(words.split_whitespace()).map(str::to_owned).collect()
 }
 

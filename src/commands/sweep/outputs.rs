@@ -127,7 +127,7 @@ struct Along {
 }
 
 const BAKE: Along = Along { figure: "bake_s", label: "bake time (s)", factor: 1.0 };
-const BYTES: Along = Along { figure: "bytes", label: "memory at run time (bytes)", factor: 1.0 };
+const BYTES: Along = Along { figure: "bytes", label: "memory at run time (KiB)", factor: 1.0 / 1024.0 };
 const SHADING: Along = Along { figure: "shade_ms", label: "shading of the picture, all threads (ms)", factor: 1.0 };
 const ERROR: Along =
     Along { figure: "error_relative", label: "rmse of indirect irradiance ÷ mean (%)", factor: 100.0 };
@@ -144,7 +144,7 @@ fn charts(report: &SweepReport) -> [(&'static str, Chart); 4] {
         Chart {
             title: title.to_owned(),
             note: format!(
-                "{}, {}×{}, reference {} samples per pixel; {seeds}; filled: on the front of its ladder",
+                "camera {}, {}×{}, reference {} samples per pixel; {seeds}; filled: on the front of its ladder",
                 report.camera,
                 report.width,
                 report.height,
@@ -157,7 +157,12 @@ fn charts(report: &SweepReport) -> [(&'static str, Chart); 4] {
         }
     };
     let mut time = chart("Error against bake time", BAKE, ERROR, |f| &f.bake_s);
-    time.guides = report.ladders.iter().enumerate().filter_map(|(i, ladder)| noise_guide(report, ladder, i)).collect();
+    time.guides = report
+        .ladders
+        .iter()
+        .enumerate()
+        .filter_map(|(i, ladder)| noise_guide(&ruled_by_noise(report, ladder), &ladder.name, i))
+        .collect();
     let mut all = [
         ("error_time", time),
         ("error_bytes", chart("Error against memory", BYTES, ERROR, |f| &f.bytes)),
@@ -186,26 +191,29 @@ fn series(report: &SweepReport, ladder: &LadderReport, x: &Along, y: &Along, fro
     Series { name: ladder.name.clone(), marks: ladder.configurations.iter().filter_map(mark).collect() }
 }
 
-/// The slope of noise, error ∝ 1/√time, through the middle of a ladder's configurations that noise rules.
-fn noise_guide(report: &SweepReport, ladder: &LadderReport, series: usize) -> Option<Guide> {
-    /// How far it reaches beyond them, as a factor.
-    const REACH: f64 = 1.5;
-    let ruled = ladder.configurations.iter().filter_map(|&i| report.configurations.get(i));
-    let ruled = ruled.filter(|c| c.ruled_by == Some("noise"));
-    let points: Vec<(f64, f64)> = ruled
+/// Bake time and error of a ladder's configurations that noise rules.
+fn ruled_by_noise(report: &SweepReport, ladder: &LadderReport) -> Vec<(f64, f64)> {
+    let of_ladder = ladder.configurations.iter().filter_map(|&i| report.configurations.get(i));
+    let ruled = of_ladder.filter(|c| c.ruled_by == Some("noise"));
+    ruled
         .filter_map(|c| Some((figure(c, &BAKE)?[0], figure(c, &ERROR)?[0])))
         .filter(|p| p.0 > 0.0 && p.1 > 0.0)
-        .collect();
+        .collect()
+}
+
+/// The slope of noise, error ∝ 1/√time, through the middle of these points.
+fn noise_guide(points: &[(f64, f64)], ladder: &str, series: usize) -> Option<Guide> {
+    /// How far it reaches beyond them, as a factor.
+    const REACH: f64 = 1.5;
     if points.is_empty() {
         return None;
     }
-    let n = points.len() as f64;
-    // Of log(error·√time).
-    let offset = points.iter().map(|p| p.1.ln() + 0.5 * p.0.ln()).sum::<f64>() / n;
+    // Mean of log(error·√time).
+    let offset = points.iter().map(|p| p.1.ln() + 0.5 * p.0.ln()).sum::<f64>() / points.len() as f64;
     let low = points.iter().map(|p| p.0).fold(f64::INFINITY, f64::min) / REACH;
     let high = points.iter().map(|p| p.0).fold(0.0, f64::max) * REACH;
     let at = |time: f64| (time, (offset - 0.5 * time.ln()).exp());
-    let name = format!("noise of {}: 1/√time", ladder.name);
+    let name = format!("noise of {ladder}: 1/√time");
     Some(Guide { name, series: Some(series), from: at(low), to: at(high), dotted: true })
 }
 
@@ -217,7 +225,24 @@ fn floors(report: &SweepReport, chart: &Chart) -> Vec<Guide> {
         let (low, high) = (xs().fold(f64::INFINITY, f64::min), xs().fold(0.0, f64::max));
         let y = level * ERROR.factor;
         let name = format!("bias of {}: {}", ladder.name, format::percent(level));
-        (low < high).then(|| Guide { name, series: Some(i), from: (low, y), to: (high, y), dotted: false })
+        (low < high).then_some(Guide { name, series: Some(i), from: (low, y), to: (high, y), dotted: false })
     };
     report.ladders.iter().enumerate().filter_map(floor).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points on 3/√time lie on their guide, which reaches beyond them.
+    #[test]
+    fn the_guide_of_noise_goes_through_it() {
+        let law = |time: f64| 3.0 / time.sqrt();
+        let guide = noise_guide(&[1.0, 4.0, 16.0].map(|t| (t, law(t))), "a", 2).unwrap();
+        for (time, error) in [guide.from, guide.to] {
+            assert!((error / law(time) - 1.0).abs() < 1e-12);
+        }
+        assert!(guide.from.0 < 1.0 && guide.to.0 > 16.0 && guide.dotted && guide.series == Some(2));
+        assert_eq!(noise_guide(&[], "a", 0), None);
+    }
 }

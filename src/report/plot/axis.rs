@@ -34,7 +34,8 @@ const PADDING: f64 = 0.05;
 /// A range without length is widened to this factor on both sides of a logarithmic axis.
 const SINGLE_FACTOR: f64 = 2.0;
 
-/// Decades up to which 2 and 5 are labelled too, and up to which all nine digits have ticks.
+/// Decades up to which all digits are labelled, up to which 2 and 5 are besides 1, and up to which all have ticks.
+const DECADES_OF_ALL: f64 = 0.9;
 const DECADES_OF_125: f64 = 2.5;
 const DECADES_OF_MINOR: f64 = 6.0;
 
@@ -94,7 +95,11 @@ impl Span {
 
     fn log_ticks(&self) -> Vec<Tick> {
         let decades = self.high - self.low;
-        let labelled: &[u32] = if decades <= DECADES_OF_125 { &[1, 2, 5] } else { &[1] };
+        let labelled: &[u32] = match decades {
+            d if d <= DECADES_OF_ALL => &[1, 2, 3, 4, 5, 6, 7, 8, 9],
+            d if d <= DECADES_OF_125 => &[1, 2, 5],
+            _ => &[1],
+        };
         // Far ranges have a label every few decades.
         let stride = (decades / MOST_LABELS as f64).ceil().max(1.0) as i32;
         let digits = if decades <= DECADES_OF_MINOR { 1..=9 } else { 1..=1 };
@@ -109,6 +114,11 @@ impl Span {
                 let label = if shown { power_label(digit, exponent) } else { String::new() };
                 found.push(((place - self.low) / decades, label));
             }
+        }
+        if found.iter().filter(|tick| !tick.1.is_empty()).count() < 2 {
+            // So short a range is nearly linear.
+            let at = ticks(10f64.powf(self.low), 10f64.powf(self.high), MOST_LABELS - 1, false);
+            found = at.into_iter().map(|(value, label)| (self.share(value), label)).collect();
         }
         found
     }
@@ -137,7 +147,8 @@ mod tests {
     fn logarithmic_ticks_are_round() {
         assert_eq!(labels([0.9, 21.0]), ["1", "2", "5", "10", "20"]);
         assert_eq!(labels([1e3, 1e7]), ["1000", "10000", "10⁵", "10⁶", "10⁷"]);
-        assert_eq!(labels([0.019, 0.06]), ["0.02", "0.05"]);
+        assert_eq!(labels([0.019, 0.06]), ["0.02", "0.03", "0.04", "0.05", "0.06"]);
+        assert_eq!(labels([31.0, 33.0]), ["31.0", "31.5", "32.0", "32.5", "33.0"]);
         assert!((2..=9).contains(&labels([1e-200, 1e200]).len()), "{:?}", labels([1e-200, 1e200]));
     }
 

@@ -119,14 +119,15 @@ pub fn measure(
     step();
     let lit = truth.visibility_on.error_relative;
     causes.push(cause("bake", "probes lit by full paths", lit));
-    // What right probes under exact visibility leave is the interpolation's own; taking it away is not to be done by any bake.
-    let interpolated = truth.visibility_ray.error_relative;
-    let without = all.zip(interpolated).map(|(all, own)| (all * all - own * own).max(0.0).sqrt());
-    causes.push(cause(
-        "interpolation",
-        "the squared error that path-lit probes with exact visibility (path_ray) still have taken away",
-        without,
-    ));
+    // What right probes under exact visibility still err, no bake can take away: it is the interpolation's own.
+    let own = truth.visibility_ray.error_relative;
+    causes.push(FloorCause {
+        cause: "interpolation",
+        how: "path-lit probes with exact visibility (path_ray) err by it alone".to_owned(),
+        // None where other errors make up for a part of it.
+        error_relative: all.zip(own).filter(|(all, own)| all >= own).map(|(all, own)| (all * all - own * own).sqrt()),
+        share: all.zip(own).filter(|(all, _)| *all > 0.0).map(|(all, own)| (own / all).powi(2)),
+    });
     Ok(FloorReport {
         ladder: ladder.to_owned(),
         configuration: index,

@@ -32,9 +32,9 @@ use crate::probe::survey::Measured;
 use crate::probe::{Grid, Volume};
 use crate::progress::Progress;
 use crate::report::bake::{Numerics, Rays, Times};
-use crate::scene::{Mesh, Scene};
+use crate::scene::Mesh;
 
-pub use self::memory::Memory;
+pub use self::memory::{Memory, check, surely_fits};
 pub use self::predict::Prediction;
 
 /// Hits this far outside the hull of the probes, in spacings, still count as inside: rounding of the bounds.
@@ -163,27 +163,6 @@ pub fn prepare<'w, 's>(
     let survey_s = started.elapsed().as_secs_f64();
     let hull = grid.hull(HULL_TOLERANCE);
     Ok(Prepared { world, config, grid, placement, surface, plan, survey_rays, survey_s, memory, hull })
-}
-
-/// Refuses, before anything is traced, what cannot be baked: a grid that is none, and what needs more memory than there is
-/// whatever the survey finds.
-///
-/// # Errors
-/// [`BakeError::Grid`], [`BakeError::Memory`].
-pub fn check(config: &Config, scene: &Scene) -> Result<(), BakeError> {
-    let grid = Grid::new(&config.grid, scene)?;
-    Ok(Memory::of(config, &grid, &scene.mesh).check(config, 0)?)
-}
-
-/// Whether all captures fit into memory even where every probe is baked and every ray meets a surface; else only
-/// [`Prepared::check_memory`] can tell whether they do.
-///
-/// # Errors
-/// [`BakeError::Grid`].
-pub fn surely_fits(config: &Config, scene: &Scene) -> Result<bool, BakeError> {
-    let grid = Grid::new(&config.grid, scene)?;
-    let captures = (grid.probe_count() as u64).saturating_mul(memory::surfels_bytes(config));
-    Ok(Memory::of(config, &grid, &scene.mesh).check(config, captures).is_ok())
 }
 
 /// Active probes that no surface sees are not worth baking.

@@ -12,7 +12,7 @@ minutes; an interrupted one goes on where it stopped. LIGHTPROBE names a binary 
 provide_lightprobe
 
 work=out/readme-sweep
-"$lightprobe" sweep scenes/two_rooms_open.glb -o "$work" --ladder configs/sweeps/readme.ron --size 160x90 --reference 1024
+"$lightprobe" sweep scenes/two_rooms_open.glb -o "$work" --ladder configs/sweeps/readme.ron --size 160x90 --reference 128
 cp -- "$work/error_time.png" scripts/readme/sweep.png
 
 du -b -- scripts/readme/sweep.png

@@ -35,7 +35,7 @@ use crate::progress::Progress;
 use crate::report::bake::{Numerics, Rays, Times};
 use crate::scene::Mesh;
 
-pub use self::memory::Memory;
+pub use self::memory::{Memory, check, surely_fits};
 pub use self::predict::Prediction;
 
 /// Hits this far outside the hull of the probes, in spacings, still count as inside: rounding of the bounds.

@@ -48,6 +48,11 @@ pub enum Command {
     ///
     /// Progress is saved to FILE.exr every minute.
     Reference(ReferenceArgs),
+    /// Bake many configurations and set their errors against run time, bytes and leaks.
+    ///
+    /// All are compared with one path-traced reference, each with several seeds. Finished runs are kept in DIR/runs: a sweep
+    /// that was interrupted, or has got more configurations or seeds, runs only what is missing.
+    Sweep(SweepArgs),
     /// Print what a probe file holds, and check its hashes.
     Inspect(InspectArgs),
 }
@@ -206,6 +211,52 @@ const MAX_SPP: i64 = 1 << 30;
 pub enum TransportName {
     Lambert,
     Gltf,
+}
+
+#[derive(Debug, Args)]
+pub struct SweepArgs {
+    /// Scene: a .glb or .gltf file.
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    #[command(flatten)]
+    pub trace: TraceArgs,
+    /// Folder for reference, runs, report, table and plots; created where missing.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Built-in configuration to compare, may be repeated; `all`: every one. The default where no --preset, --config nor
+    /// base in the ladder is given.
+    #[arg(long, value_name = "NAME|all")]
+    pub preset: Vec<String>,
+    /// Configuration file to compare, may be repeated.
+    #[arg(long, value_name = "FILE.ron")]
+    pub config: Vec<PathBuf>,
+    /// Ladders: which keys of the configurations take which values.
+    #[arg(long, value_name = "FILE.ron")]
+    pub ladder: Option<PathBuf>,
+    /// Override one key of all configurations; may be repeated. The values of a ladder go before it.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Compare at equal probe positions (all methods take grid and placement of the first) or at equal bytes.
+    #[arg(long, value_enum)]
+    pub equal: Option<EqualName>,
+    /// Samples per pixel of the reference, rounded up to a multiple of 16. More are added to one that is there.
+    #[arg(long, value_name = "SPP", default_value_t = 256, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=MAX_SPP))]
+    pub reference: u32,
+    /// Bakes of every configuration, with the seeds from --seed on. From 2 on, noise is told from bias.
+    #[arg(long, value_name = "N", default_value_t = 3, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=MAX_SEEDS))]
+    pub seeds: u32,
+    #[command(flatten)]
+    pub view: ViewArgs,
+}
+
+/// Most seeds of a sweep: the spread is known well long before.
+const MAX_SEEDS: i64 = 1000;
+
+/// What is held equal between methods.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum EqualName {
+    Positions,
+    Bytes,
 }
 
 #[derive(Debug, Args)]

@@ -9,7 +9,7 @@
 //! | 2 rays | [`trace`] | Embree behind one small type; the only unsafe code |
 //! | 3 light | [`light`] | what a surface sends out: one definition for bake and render |
 //! | 4 probes | [`probe`] | grid, placement, capture, solver, filter, encoding, query, file |
-//! | 5 results | [`shade`], [`report`] | pictures and figures |
+//! | 5 results | [`shade`], [`report`], [`evaluate`], [`sweep`] | pictures and figures, series of bakes |
 //! | 6 edge | [`config`], [`plan`], [`cli`], [`commands`] | what was asked, what is done about it |
 #![deny(unsafe_code)]
 
@@ -17,6 +17,7 @@ pub mod bake;
 pub mod cli;
 pub mod commands;
 pub mod config;
+pub mod evaluate;
 pub mod image;
 pub mod input;
 pub mod light;
@@ -29,4 +30,5 @@ pub mod progress;
 pub mod report;
 pub mod scene;
 pub mod shade;
+pub mod sweep;
 pub mod trace;

@@ -10,9 +10,9 @@ use crate::probe::filter::{FilterSettings, Kernel};
 use crate::probe::query::VisibilitySettings;
 use crate::probe::surfel::Surfel;
 use crate::probe::survey;
-use crate::scene::Mesh;
+use crate::scene::{Mesh, Scene};
 
-use super::SURVEY_VOXELS;
+use super::{BakeError, SURVEY_VOXELS};
 
 /// What every probe takes besides its maps: position and state, twice, what placement found around it, and the heads of
 /// its capture, of its masks and of a sweep's result.
@@ -120,6 +120,27 @@ impl Memory {
             },
         })
     }
+}
+
+/// Refuses, before anything is traced, what cannot be baked: a grid that is none, and what needs more memory than there is
+/// whatever the survey finds.
+///
+/// # Errors
+/// [`BakeError::Grid`], [`BakeError::Memory`].
+pub fn check(config: &Config, scene: &Scene) -> Result<(), BakeError> {
+    let grid = Grid::new(&config.grid, scene)?;
+    Ok(Memory::of(config, &grid, &scene.mesh).check(config, 0)?)
+}
+
+/// Whether all captures fit into memory even where every probe is baked and every ray meets a surface; else only
+/// [`Prepared::check_memory`] can tell whether they do.
+///
+/// # Errors
+/// [`BakeError::Grid`].
+pub fn surely_fits(config: &Config, scene: &Scene) -> Result<bool, BakeError> {
+    let grid = Grid::new(&config.grid, scene)?;
+    let captures = (grid.probe_count() as u64).saturating_mul(surfels_bytes(config));
+    Ok(Memory::of(config, &grid, &scene.mesh).check(config, captures).is_ok())
 }
 
 /// Most that one probe's captured surfaces can take.

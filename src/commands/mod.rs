@@ -5,6 +5,7 @@ mod camera;
 pub mod inspect;
 pub mod reference;
 pub mod render;
+pub mod sweep;
 mod tell;
 
 use std::io::Write;
@@ -62,6 +63,7 @@ pub fn run(cli: Cli) -> Result<()> {
         Command::Bake(args) => bake::run(&args, &console),
         Command::Render(args) => render::run(&args, &console),
         Command::Reference(args) => reference::run(&args, &console),
+        Command::Sweep(args) => sweep::run(&args, &console),
         Command::Inspect(args) => inspect::run(&args, &console),
     }
 }
@@ -100,13 +102,18 @@ fn resolve_config(args: &ConfigArgs, trace: &TraceArgs) -> Result<Config> {
         (None, None) => Config::default(),
     };
     config = config.with_overrides(&args.set)?;
+    set_sky(&mut config, trace);
+    Ok(config)
+}
+
+/// A constant `--env` in place of the configured sky.
+fn set_sky(config: &mut Config, trace: &TraceArgs) {
     match &trace.env {
         Some(EnvironmentSource::Constant(sky)) => config.lights.sky = Some((*sky).into()),
         // A map replaces the configured sky; its path has no place in the file.
         Some(EnvironmentSource::File(_)) => config.lights.sky = None,
         None => {}
     }
-    Ok(config)
 }
 
 /// Loads a scene with the sky from the command line, else from the configuration, and passes its warnings on.

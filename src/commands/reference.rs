@@ -30,8 +30,8 @@ const SAVE_INTERVAL: Duration = Duration::from_secs(60);
 
 /// Memory that a reference takes at its peak, per pixel: measured at 960 × 540, rounded up; the second where all layers
 /// are accumulated, with translucent surfaces or glossy ones.
-const PIXEL_BYTES: f64 = 850.0;
-const LAYERED_PIXEL_BYTES: f64 = 2000.0;
+pub(super) const PIXEL_BYTES: f64 = 850.0;
+pub(super) const LAYERED_PIXEL_BYTES: f64 = 2000.0;
 
 pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
     if args.view.camera.as_deref() == Some("all") {
@@ -88,7 +88,7 @@ pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
             args.output.display()
         ));
     }
-    times.trace = trace(&mut tracing, args, &identity, console)?;
+    times.trace = trace(&mut tracing, &args.output, &identity, console)?;
     let reference = tracing.develop();
     tell::traced(console, reference.spp, reference.rays, times.trace);
     if !is_complete {
@@ -166,7 +166,7 @@ fn previous(
 }
 
 /// Adds blocks until there are enough, and saves what there is now and then; the seconds without saving.
-fn trace(tracing: &mut Tracing, args: &ReferenceArgs, identity: &Identity, console: &Console) -> Result<f64> {
+pub(super) fn trace(tracing: &mut Tracing, path: &Path, identity: &Identity, console: &Console) -> Result<f64> {
     let bar = console.progress.stage("reference", tracing.remaining() as usize);
     let (started, mut saved, mut saving) = (Instant::now(), Instant::now(), Duration::ZERO);
     while tracing.remaining() > 0 {
@@ -177,7 +177,7 @@ fn trace(tracing: &mut Tracing, args: &ReferenceArgs, identity: &Identity, conso
         }
         if tracing.remaining() > 0 && saved.elapsed() >= SAVE_INTERVAL {
             let save_started = Instant::now();
-            tracing.develop().write(&args.output, identity)?;
+            tracing.develop().write(path, identity)?;
             saving += save_started.elapsed();
             saved = Instant::now();
         }

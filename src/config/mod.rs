@@ -78,12 +78,7 @@ pub enum ConfigError {
 impl Config {
     /// Reads RON text; `place` names it in errors.
     pub fn parse(text: &str, place: &str) -> Result<Config, ConfigError> {
-        // Some editors write a byte order mark.
-        let text = text.trim_start_matches('\u{feff}');
-        let config: Config = ron_options().from_str(text).map_err(|e| ConfigError::Invalid {
-            place: format!("{place}, line {} column {}", e.span.start.line, e.span.start.col),
-            what: messages::of_file(&e, text),
-        })?;
+        let config: Config = from_ron(text, place)?;
         config.check(place)?;
         if config.grid.spacing_m.is_some() && config.grid.divisions.is_some() {
             let what = "grid.spacing_m and grid.divisions are both given; remove one".to_owned();
@@ -110,6 +105,16 @@ impl Config {
         // Plain records of numbers and enums: nothing in them can fail to serialise.
         ron::ser::to_string_pretty(self, pretty).unwrap_or_default()
     }
+}
+
+/// Reads RON text as configurations are written; `place` names it in errors.
+pub fn from_ron<T: serde::de::DeserializeOwned>(text: &str, place: &str) -> Result<T, ConfigError> {
+    // Some editors write a byte order mark.
+    let text = text.trim_start_matches('\u{feff}');
+    ron_options().from_str(text).map_err(|e| ConfigError::Invalid {
+        place: format!("{place}, line {} column {}", e.span.start.line, e.span.start.col),
+        what: messages::of_file(&e, text),
+    })
 }
 
 /// RON in which optional values are written without `Some`.

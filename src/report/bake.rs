@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::header::Header;
 use crate::plan::Line;
@@ -34,7 +34,7 @@ pub struct BakeReport {
     pub plan: Vec<Line>,
 }
 
-#[derive(Debug, Clone, Copy, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Rays {
     pub primary: u64,
     pub shadow: u64,

@@ -2,7 +2,7 @@
 //! same probes' by full paths.
 
 use glam::Vec3A;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::error::terms::fold;
 use crate::math::color::luminance;
@@ -12,7 +12,7 @@ use crate::probe::map::interior_texel;
 use crate::probe::truth::Truth;
 
 /// Sums run over all texels of active probes by their solid angle, in luminance. All are shares of ΣE_path.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct BakedFigures {
     /// Σ(E − E_path): positive where the bake is too bright.
     pub bias: Option<f64>,

@@ -5,7 +5,7 @@
 //! are left out and counted.
 
 use glam::Vec3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::reference_layers::ReferenceLayers;
 use crate::math::color::luminance;
@@ -13,7 +13,7 @@ use crate::probe::query::Query;
 use crate::shade::methods::Method;
 use crate::shade::points::ImagePoint;
 
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Leak {
     /// Σ max(0, E − Ê) ÷ ΣÊ; `null` where no light is to be seen.
     pub light: Option<f64>,

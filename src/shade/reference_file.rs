@@ -60,6 +60,13 @@ impl Identity {
     }
 }
 
+impl Identity {
+    /// All of it as text: equal texts are equal identities.
+    pub fn to_text(&self) -> String {
+        self.0.iter().map(|(name, value)| format!("{name} = {value}\n")).collect()
+    }
+}
+
 /// What of an [`Identity`] says which picture it is; the rest says how it was made.
 const PICTURE: &[&str] = &["scene_blake3", "punctual_scale", "albedo_max", "camera_view", "size"];
 

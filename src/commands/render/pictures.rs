@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use glam::Vec3;
 
+use super::Run;
 use super::reference::Reference;
-use super::{Run, Shaded};
+use crate::evaluate::Shaded;
 use crate::image::{LayeredImage, Picture8};
 use crate::math::color::luminance;
 use crate::report::colormap::Scale;

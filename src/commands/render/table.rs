@@ -1,6 +1,6 @@
 //! A render's report for people.
 
-use super::PATH_RAY;
+use crate::evaluate::PATH_RAY;
 use crate::report::baked::BakedReport;
 use crate::report::error::{ErrorReport, Measured};
 use crate::report::format;

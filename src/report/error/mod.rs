@@ -27,7 +27,7 @@ pub mod terms;
 mod window;
 
 use glam::Vec3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::reference_layers::ReferenceLayers;
 use crate::shade::regions::Region;
@@ -50,7 +50,7 @@ const NOISE_UNKNOWN: &str =
     "no error estimate: the reference does not say how noisy it is (below 32 samples per pixel it cannot)";
 
 /// Figures, or their standard errors. Undefined ones are `null`.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Figures {
     /// W·m⁻², as are `rmse`, `bias`, `over`, `under`.
     pub mae: Option<f64>,

@@ -1,0 +1,248 @@
+//! The files of a sweep: report, table of numbers, plots.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+
+use crate::commands::write_json;
+use crate::output::write_atomically;
+use crate::report::format;
+use crate::report::plot::{Axis, Chart, ChartSize, Guide, Mark, Scale, Series};
+use crate::report::sweep::{Aggregate, ConfigurationReport, Fronts, LadderReport, SweepReport};
+
+/// All that a sweep's folder gets besides its runs.
+pub const FILES: &[&str] = &[
+    super::reference::FILE,
+    "sweep.json",
+    "sweep.csv",
+    "error_time.svg",
+    "error_time.png",
+    "error_bytes.svg",
+    "error_bytes.png",
+    "error_shading.svg",
+    "error_shading.png",
+    "leak_bytes.svg",
+    "leak_bytes.png",
+];
+
+pub fn write(report: &SweepReport, folder: &Path) -> Result<()> {
+    write_json(&folder.join("sweep.json"), report)?;
+    let table = csv(report).context("cannot write the table of numbers")?;
+    write_atomically(&folder.join("sweep.csv"), |file| std::io::Write::write_all(file, &table))?;
+    for (name, chart) in charts(report) {
+        chart.write(&folder.join(name), ChartSize::default())?;
+    }
+    Ok(())
+}
+
+/// One line for every run.
+fn csv(report: &SweepReport) -> Result<Vec<u8>> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let head = [
+        "ladder",
+        "method",
+        "label",
+        "seed",
+        "probes",
+        "probes_active",
+        "bytes",
+        "file_bytes",
+        "bake_s",
+        "survey_s",
+        "capture_s",
+        "bounces_s",
+        "filter_s",
+        "encode_s",
+        "rays_primary",
+        "rays_shadow",
+        "rays_survey",
+        "bounces",
+        "converged",
+        "visibility",
+        "shade_ms",
+        "lookup_ns",
+        "leak_light",
+        "leak_dark",
+        "leak_fraction",
+        "leak_unseen",
+        "error_relative",
+        "error_rmse",
+        "error_relmse",
+        "error_mae",
+        "error_bias",
+        "error_flip",
+    ];
+    writer.write_record(head)?;
+    for configuration in &report.configurations {
+        let ladder = &report.ladders[configuration.ladder];
+        for run in &configuration.runs {
+            let (t, rays) = (&run.time_s, &run.rays);
+            for m in &run.methods {
+                let number = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
+                let mut row = vec![
+                    ladder.name.clone(),
+                    ladder.method.clone(),
+                    configuration.label.clone(),
+                    run.seed.to_string(),
+                    run.probes.to_string(),
+                    run.probes_active.to_string(),
+                    run.bytes.to_string(),
+                    run.file_bytes.to_string(),
+                ];
+                row.extend([run.bake_s, t.survey, t.capture, t.bounces, t.filter, t.encode].map(|s| s.to_string()));
+                row.extend([rays.primary, rays.shadow, rays.survey].map(|n| n.to_string()));
+                row.extend([
+                    run.bounces.to_string(),
+                    run.converged.to_string(),
+                    m.name.clone(),
+                    m.shade_ms.to_string(),
+                ]);
+                let e = &m.error;
+                let numbers = [
+                    m.lookup_ns,
+                    m.leak.light,
+                    m.leak.dark,
+                    m.leak.fraction,
+                    Some(m.leak.unseen),
+                    m.error_relative,
+                    e.rmse,
+                    e.relmse,
+                    e.mae,
+                    e.bias,
+                    e.flip,
+                ];
+                row.extend(numbers.map(number));
+                writer.write_record(row)?;
+            }
+        }
+    }
+    Ok(writer.into_inner()?)
+}
+
+/// Which figure of a configuration stands along an axis.
+struct Along {
+    figure: &'static str,
+    label: &'static str,
+    factor: f64,
+}
+
+const BAKE: Along = Along { figure: "bake_s", label: "bake time (s)", factor: 1.0 };
+const BYTES: Along = Along { figure: "bytes", label: "memory at run time (KiB)", factor: 1.0 / 1024.0 };
+const SHADING: Along = Along { figure: "shade_ms", label: "shading of the picture, all threads (ms)", factor: 1.0 };
+const ERROR: Along =
+    Along { figure: "error_relative", label: "rmse of indirect irradiance ÷ mean (%)", factor: 100.0 };
+const LEAK: Along = Along { figure: "leak_light", label: "leaked light ÷ light (%)", factor: 100.0 };
+
+fn charts(report: &SweepReport) -> [(&'static str, Chart); 4] {
+    let chart = |title: &str, x: Along, y: Along, front: fn(&Fronts) -> &Vec<usize>| {
+        let series =
+            report.ladders.iter().map(|ladder| series(report, ladder, &x, &y, front(&ladder.fronts))).collect();
+        let seeds = match report.seeds.len() {
+            1 => "one seed".to_owned(),
+            n => format!("mean of {n} seeds, bars from least to most"),
+        };
+        Chart {
+            title: title.to_owned(),
+            note: format!(
+                "camera {}, {}×{}, reference {} samples per pixel; {seeds}; filled: on the front of its ladder",
+                report.camera,
+                report.width,
+                report.height,
+                report.reference.spp.map_or(0, |spp| spp)
+            ),
+            x: Axis::new(x.label, Scale::Log),
+            y: Axis::new(y.label, Scale::Log),
+            series,
+            guides: Vec::new(),
+        }
+    };
+    let mut time = chart("Error against bake time", BAKE, ERROR, |f| &f.bake_s);
+    time.guides = report
+        .ladders
+        .iter()
+        .enumerate()
+        .filter_map(|(i, ladder)| noise_guide(&ruled_by_noise(report, ladder), &ladder.name, i))
+        .collect();
+    let mut all = [
+        ("error_time", time),
+        ("error_bytes", chart("Error against memory", BYTES, ERROR, |f| &f.bytes)),
+        ("error_shading", chart("Error against shading time", SHADING, ERROR, |f| &f.shade_ms)),
+        ("leak_bytes", chart("Leaked light against memory", BYTES, LEAK, |f| &f.leak_light)),
+    ];
+    for (_, chart) in &mut all[..3] {
+        let floors = floors(report, chart);
+        chart.guides.extend(floors);
+    }
+    all
+}
+
+fn figure(configuration: &ConfigurationReport, along: &Along) -> Option<[f64; 3]> {
+    let Aggregate { mean, min, max, .. } = *configuration.figures.get(along.figure)?;
+    Some([mean?, min?, max?].map(|v| v * along.factor))
+}
+
+fn series(report: &SweepReport, ladder: &LadderReport, x: &Along, y: &Along, front: &[usize]) -> Series {
+    let mark = |&i: &usize| {
+        let configuration = report.configurations.get(i)?;
+        let ([x, x_min, x_max], [y, y_min, y_max]) = (figure(configuration, x)?, figure(configuration, y)?);
+        let bar = |low: f64, high: f64| (high > low).then_some([low, high]);
+        Some(Mark { x, y, x_bar: bar(x_min, x_max), y_bar: bar(y_min, y_max), on_front: front.contains(&i) })
+    };
+    Series { name: ladder.name.clone(), marks: ladder.configurations.iter().filter_map(mark).collect() }
+}
+
+/// Bake time and error of a ladder's configurations that noise rules.
+fn ruled_by_noise(report: &SweepReport, ladder: &LadderReport) -> Vec<(f64, f64)> {
+    let of_ladder = ladder.configurations.iter().filter_map(|&i| report.configurations.get(i));
+    let ruled = of_ladder.filter(|c| c.ruled_by == Some("noise"));
+    ruled
+        .filter_map(|c| Some((figure(c, &BAKE)?[0], figure(c, &ERROR)?[0])))
+        .filter(|p| p.0 > 0.0 && p.1 > 0.0)
+        .collect()
+}
+
+/// The slope of noise, error ∝ 1/√time, through the middle of these points.
+fn noise_guide(points: &[(f64, f64)], ladder: &str, series: usize) -> Option<Guide> {
+    /// How far it reaches beyond them, as a factor.
+    const REACH: f64 = 1.5;
+    if points.is_empty() {
+        return None;
+    }
+    // Mean of log(error·√time).
+    let offset = points.iter().map(|p| p.1.ln() + 0.5 * p.0.ln()).sum::<f64>() / points.len() as f64;
+    let low = points.iter().map(|p| p.0).fold(f64::INFINITY, f64::min) / REACH;
+    let high = points.iter().map(|p| p.0).fold(0.0, f64::max) * REACH;
+    let at = |time: f64| (time, (offset - 0.5 * time.ln()).exp());
+    let name = format!("noise of {ladder}: 1/√time");
+    Some(Guide { name, series: Some(series), from: at(low), to: at(high), dotted: true })
+}
+
+/// Horizontal lines at what bias leaves.
+fn floors(report: &SweepReport, chart: &Chart) -> Vec<Guide> {
+    let floor = |(i, ladder): (usize, &LadderReport)| {
+        let level = ladder.floor_relative.filter(|level| *level > 0.0)?;
+        let xs = || chart.series[i].marks.iter().map(|m| m.x).filter(|x| *x > 0.0);
+        let (low, high) = (xs().fold(f64::INFINITY, f64::min), xs().fold(0.0, f64::max));
+        let y = level * ERROR.factor;
+        let name = format!("bias of {}: {}", ladder.name, format::percent(level));
+        (low < high).then_some(Guide { name, series: Some(i), from: (low, y), to: (high, y), dotted: false })
+    };
+    report.ladders.iter().enumerate().filter_map(floor).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points on 3/√time lie on their guide, which reaches beyond them.
+    #[test]
+    fn the_guide_of_noise_goes_through_it() {
+        let law = |time: f64| 3.0 / time.sqrt();
+        let guide = noise_guide(&[1.0, 4.0, 16.0].map(|t| (t, law(t))), "a", 2).unwrap();
+        for (time, error) in [guide.from, guide.to] {
+            assert!((error / law(time) - 1.0).abs() < 1e-12);
+        }
+        assert!(guide.from.0 < 1.0 && guide.to.0 > 16.0 && guide.dotted && guide.series == Some(2));
+        assert_eq!(noise_guide(&[], "a", 0), None);
+    }
+}

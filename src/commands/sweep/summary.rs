@@ -1,0 +1,185 @@
+//! From runs to the report.
+
+use std::collections::BTreeMap;
+
+use super::SweepArgs;
+use crate::cli::EqualName;
+use crate::config::Config;
+use crate::report::header::Header;
+use crate::report::render::ReferenceSummary;
+use crate::report::sweep::{
+    Aggregate, AxisValue, Cheapest, CheapestAt, ConfigurationReport, ERROR_FIGURE, FloorReport, Fronts, LadderReport,
+    MethodFigures, OnFront, RunRecord, SCHEMA, SweepReport, SweepTimes,
+};
+use crate::scene::{Camera, Scene};
+use crate::shade::methods::Method;
+use crate::shade::points::View;
+use crate::sweep::equal;
+use crate::sweep::front::{cheapest, levels, pareto};
+use crate::sweep::ladder::{Ladder, Rung};
+use crate::sweep::split::Split;
+
+/// A configuration after all its runs.
+pub struct Measured {
+    pub config: Config,
+    pub report: ConfigurationReport,
+}
+
+/// A figure of a run; of a method where it differs between them.
+type Figure = fn(&RunRecord, &MethodFigures) -> Option<f64>;
+
+/// Figures over the seeds, by the names that the report has.
+const FIGURES: &[(&str, Figure)] = &[
+    ("bake_s", |r, _| Some(r.bake_s)),
+    ("bytes", |r, _| Some(r.bytes)),
+    ("bytes_per_probe", |r, _| Some(r.bytes_per_probe)),
+    ("file_bytes", |r, _| Some(r.file_bytes as f64)),
+    ("shade_ms", |_, m| Some(m.shade_ms)),
+    ("lookup_ns", |_, m| m.lookup_ns),
+    ("leak_light", |_, m| m.leak.light),
+    ("leak_dark", |_, m| m.leak.dark),
+    ("leak_fraction", |_, m| m.leak.fraction),
+    ("leak_unseen", |_, m| Some(m.leak.unseen)),
+    ("error_relative", |_, m| m.error_relative),
+    ("error_mae", |_, m| m.error.mae),
+    ("error_rmse", |_, m| m.error.rmse),
+    ("error_relmse", |_, m| m.error.relmse),
+    ("error_bias", |_, m| m.error.bias),
+    ("error_flip", |_, m| m.error.flip),
+];
+
+impl Measured {
+    pub fn new(
+        ladder: usize,
+        rung: &Rung,
+        runs: Vec<RunRecord>,
+        split: Split,
+        reference_mean: Option<f64>,
+    ) -> Measured {
+        let value = |figure: Figure| -> Vec<Option<f64>> {
+            runs.iter().map(|run| figure(run, run.method(Method::On.name())?)).collect()
+        };
+        let figures: BTreeMap<&'static str, Aggregate> =
+            FIGURES.iter().map(|(name, figure)| (*name, Aggregate::of(&value(*figure)))).collect();
+        let relative = |value: Option<f64>| Some(value? / reference_mean?);
+        let report = ConfigurationReport {
+            label: rung.label.clone(),
+            ladder,
+            axes: rung.axes.iter().map(|(key, value)| AxisValue { key: key.clone(), value: value.clone() }).collect(),
+            config: rung.config.to_ron(),
+            probes: runs.first().map_or(0, |run| run.probes),
+            figures,
+            noise_rms: split.noise_rms,
+            noise_relative: relative(split.noise_rms),
+            bias_rms: split.bias_rms,
+            bias_relative: relative(split.bias_rms),
+            ruled_by: split.ruled_by(),
+            on_front: OnFront::default(),
+            runs,
+        };
+        Measured { config: rung.config.clone(), report }
+    }
+
+    /// NaN where it is undefined, which is on no front.
+    fn mean(&self, figure: &str) -> f64 {
+        self.report.figures.get(figure).and_then(|a| a.mean).unwrap_or(f64::NAN)
+    }
+}
+
+/// Which of these are on the front of two figures.
+fn front(measured: &[Measured], which: &[usize], cost: &str, error: &str) -> Vec<usize> {
+    let points: Vec<(f64, f64)> = which.iter().map(|&i| (measured[i].mean(cost), measured[i].mean(error))).collect();
+    which.iter().zip(pareto(&points)).filter(|(_, on)| *on).map(|(i, _)| *i).collect()
+}
+
+fn fronts(measured: &[Measured], which: &[usize]) -> Fronts {
+    Fronts {
+        bake_s: front(measured, which, "bake_s", "error_relative"),
+        bytes: front(measured, which, "bytes", "error_relative"),
+        shade_ms: front(measured, which, "shade_ms", "error_relative"),
+        leak_light: front(measured, which, "bytes", "leak_light"),
+    }
+}
+
+/// The curves.
+pub fn ladders(ladders: &[Ladder], measured: &[Measured]) -> Vec<LadderReport> {
+    let report = |(at, ladder): (usize, &Ladder)| {
+        let configurations: Vec<usize> = (0..measured.len()).filter(|&i| measured[i].report.ladder == at).collect();
+        let errors = configurations.iter().map(|&i| (i, measured[i].mean("error_relative")));
+        let best = errors.filter(|(_, e)| e.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i);
+        let of_bias = configurations.iter().map(|&i| &measured[i].report).filter(|c| c.ruled_by == Some("bias"));
+        LadderReport {
+            name: ladder.name.clone(),
+            method: ladder.method.clone(),
+            fronts: fronts(measured, &configurations),
+            best,
+            floor_relative: of_bias.filter_map(|c| c.bias_relative).reduce(f64::min),
+            configurations,
+        }
+    };
+    ladders.iter().enumerate().map(report).collect()
+}
+
+/// All that a report is made of.
+pub struct Parts<'a> {
+    pub args: &'a SweepArgs,
+    pub threads: usize,
+    pub camera: &'a Camera,
+    pub view: &'a View,
+    pub scene: &'a Scene,
+    pub reference: ReferenceSummary,
+    pub exposure_ev: f32,
+    pub times: SweepTimes,
+    pub ladders: Vec<LadderReport>,
+    pub measured: Vec<Measured>,
+    pub floor: Vec<FloorReport>,
+}
+
+pub fn report(parts: Parts) -> SweepReport {
+    let Parts { args, mut measured, ladders, .. } = parts;
+    let all: Vec<usize> = (0..measured.len()).collect();
+    let whole = fronts(&measured, &all);
+    for (i, m) in measured.iter_mut().enumerate() {
+        m.report.on_front = OnFront {
+            bake_s: whole.bake_s.contains(&i),
+            bytes: whole.bytes.contains(&i),
+            shade_ms: whole.shade_ms.contains(&i),
+            leak_light: whole.leak_light.contains(&i),
+        };
+    }
+    let errors: Vec<f64> = measured.iter().map(|m| m.mean("error_relative")).collect();
+    let cheapest_by = |cost: &str| -> Vec<CheapestAt> {
+        let points: Vec<(f64, f64)> = measured.iter().map(|m| (m.mean(cost), m.mean("error_relative"))).collect();
+        let at = |level: f64| {
+            let i = cheapest(&points, level)?;
+            let label = measured[i].report.label.clone();
+            Some(CheapestAt { error_relative: level, configuration: i, label, cost: points[i].0 })
+        };
+        levels(&errors).into_iter().filter_map(at).collect()
+    };
+    let cheapest = Cheapest { bake_s: cheapest_by("bake_s"), bytes: cheapest_by("bytes") };
+    let config = measured.first().map(|m| m.report.config.clone()).unwrap_or_default();
+    let configurations: Vec<ConfigurationReport> = measured.into_iter().map(|m| m.report).collect();
+    let equal = args.equal.map(|held| match held {
+        EqualName::Positions => equal::positions(&ladders, &configurations),
+        EqualName::Bytes => equal::bytes(&ladders, &configurations),
+    });
+    let seed = args.trace.seed;
+    SweepReport {
+        header: Header::new(SCHEMA, "sweep", seed, parts.threads, &parts.scene.blake3, config),
+        camera: parts.camera.name.clone(),
+        width: parts.view.width,
+        height: parts.view.height,
+        points: parts.view.points.len(),
+        exposure_ev: parts.exposure_ev,
+        seeds: (0..u64::from(args.seeds)).map(|k| seed.wrapping_add(k)).collect(),
+        error_figure: ERROR_FIGURE,
+        reference: parts.reference,
+        time_s: parts.times,
+        ladders,
+        configurations,
+        cheapest,
+        floor: parts.floor,
+        equal,
+    }
+}

@@ -1,0 +1,166 @@
+//! What limits a configuration: its error with one cause at a time switched off.
+//!
+//! All with the same seed as the configuration's own bake, so that what noise the two share cancels. Squared errors are compared,
+//! because errors of independent causes add in squares: a cause's share is 1 − remaining²/error². Shares of causes that act on each
+//! other do not add up to 1, and one is negative where its error hid another.
+
+use super::SweepError;
+use super::run::{Finished, Setting};
+use crate::bake::BakeError;
+use crate::config::{Config, ConfigError};
+use crate::probe::encode::ColorFormat;
+use crate::report::sweep::{FloorCause, FloorReport, RunRecord};
+use crate::shade::methods::Method;
+
+/// Bakes and truths that a floor takes at most.
+pub const STEPS: usize = 4;
+
+/// Largest resolution that a configuration may have.
+const MAX_RESOLUTION: usize = 1024;
+
+/// The tolerance against which bounces are iterated without a limit, as a share of the configuration's, and at least.
+const TOLERANCE_SHARE: f32 = 0.1;
+const TOLERANCE_LEAST: f32 = 1e-6;
+
+/// Overrides that switch a limit off: the second where the first is not known.
+const UNLIMITED_BOUNCES: [&str; 2] = ["solver.max_bounces=None", "solver.max_bounces=1048576"];
+
+/// A configuration with a cause of error switched off.
+struct Variant {
+    cause: &'static str,
+    how: String,
+    /// `None` where it is off already.
+    config: Option<Config>,
+}
+
+fn variants(config: &Config) -> Result<[Variant; 3], ConfigError> {
+    let double = |n: usize| (2 * n).min(MAX_RESOLUTION);
+    let angular = [
+        format!("filter.irradiance_resolution={}", double(config.filter.irradiance_resolution)),
+        format!("capture.resolution={}", double(config.capture.resolution)),
+    ];
+    let tolerance = (TOLERANCE_SHARE * config.solver.tolerance).max(TOLERANCE_LEAST);
+    let bounced =
+        |limit: &str| config.clone().with_overrides(&[limit.to_owned(), format!("solver.tolerance={tolerance}")]);
+    let bounces = bounced(UNLIMITED_BOUNCES[0]).or_else(|_| bounced(UNLIMITED_BOUNCES[1]))?;
+    let format = "encoding.irradiance=f32";
+    let is_exact = config.encoding.irradiance == ColorFormat::F32;
+    let encoded = if is_exact { None } else { Some(config.clone().with_overrides(&[format.to_owned()])?) };
+    Ok([
+        Variant {
+            cause: "angular_resolution",
+            how: angular.join(", "),
+            config: Some(config.clone().with_overrides(&angular)?),
+        },
+        Variant {
+            cause: "bounces",
+            how: format!("no limit of bounces, solver.tolerance={tolerance}"),
+            config: Some(bounces),
+        },
+        Variant {
+            cause: "encoding",
+            how: if is_exact { "it is f32 already" } else { format }.to_owned(),
+            config: encoded,
+        },
+    ])
+}
+
+fn error_of(record: &RunRecord, method: Method) -> Option<f64> {
+    record.method(method.name())?.error_relative
+}
+
+/// The shares of a cause without which `remaining` of `all` is left.
+fn share(all: Option<f64>, remaining: Option<f64>) -> Option<f64> {
+    let (all, remaining) = (all?, remaining?);
+    (all > 0.0).then(|| 1.0 - (remaining / all).powi(2))
+}
+
+/// Measures what the error of one configuration is made of. `step` is called after each of the [`STEPS`].
+///
+/// # Errors
+/// Those of a bake.
+pub fn measure(
+    setting: &Setting,
+    (ladder, index, label): (&str, usize, &str),
+    config: &Config,
+    base: &RunRecord,
+    warn: &dyn Fn(String),
+    step: &dyn Fn(),
+) -> Result<FloorReport, SweepError> {
+    let seed = base.seed;
+    let all = error_of(base, Method::On);
+    let cause = |cause: &'static str, how: &str, remaining: Option<f64>| FloorCause {
+        cause,
+        how: how.to_owned(),
+        error_relative: remaining,
+        share: share(all, remaining),
+    };
+    let mut causes = Vec::new();
+    for variant in variants(config)? {
+        let Some(changed) = &variant.config else {
+            causes.push(cause(variant.cause, &variant.how, all));
+            step();
+            continue;
+        };
+        let label = format!("{label} without error of {}", variant.cause);
+        causes.push(match setting.obtain(&label, changed, seed, warn) {
+            Ok(Finished { record, .. }) => cause(variant.cause, &variant.how, error_of(&record, Method::On)),
+            // It is dearer than what was asked for.
+            Err(SweepError::Bake { cause: BakeError::Memory(little), .. }) => {
+                cause(variant.cause, &format!("{}: not measured, {little}", variant.how), None)
+            }
+            Err(other) => return Err(other),
+        });
+        step();
+    }
+    let exact = error_of(base, Method::Ray);
+    causes.insert(2, cause("leaks_in_shading", "exact visibility by rays (visibility_ray)", exact));
+    let truth = setting.obtain_truth(label, config, seed, warn)?;
+    step();
+    let lit = truth.visibility_on.error_relative;
+    causes.push(cause("bake", "probes lit by full paths", lit));
+    // What right probes under exact visibility still err, no bake can take away: it is the interpolation's own.
+    let own = truth.visibility_ray.error_relative;
+    causes.push(FloorCause {
+        cause: "interpolation",
+        how: "path-lit probes with exact visibility (path_ray) err by it alone".to_owned(),
+        // None where other errors make up for a part of it.
+        error_relative: all.zip(own).filter(|(all, own)| all >= own).map(|(all, own)| (all * all - own * own).sqrt()),
+        share: all.zip(own).filter(|(all, _)| *all > 0.0).map(|(all, own)| (own / all).powi(2)),
+    });
+    Ok(FloorReport {
+        ladder: ladder.to_owned(),
+        configuration: index,
+        label: label.to_owned(),
+        seed,
+        error_relative: all,
+        causes,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_variant_differs_in_its_cause_only() {
+        let config = Config::default();
+        let [angular, bounces, encoding] = variants(&config).unwrap();
+        let angular = angular.config.unwrap();
+        assert_eq!((angular.filter.irradiance_resolution, angular.capture.resolution), (16, 64));
+        assert_eq!(Config { filter: config.filter.clone(), capture: config.capture.clone(), ..angular }, config);
+        let bounces = bounces.config.unwrap();
+        assert!(bounces.solver.tolerance < config.solver.tolerance && bounces.solver != config.solver);
+        assert_eq!(Config { solver: config.solver.clone(), ..bounces }, config);
+        assert_eq!(encoding.config.as_ref().unwrap().encoding.irradiance, ColorFormat::F32);
+        let exact = encoding.config.unwrap();
+        assert!(variants(&exact).unwrap()[2].config.is_none());
+    }
+
+    #[test]
+    fn shares_are_of_squares() {
+        assert!((share(Some(0.5), Some(0.3)).unwrap() - 0.64).abs() < 1e-12);
+        assert!(share(Some(0.5), Some(0.6)).unwrap() < 0.0);
+        assert_eq!((share(Some(0.0), Some(0.0)), share(None, Some(1.0))), (None, None));
+    }
+}

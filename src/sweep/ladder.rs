@@ -1,0 +1,332 @@
+//! Ladders: configurations that differ in a few keys, one curve in a plot each.
+//!
+//! A file holds several; all keys but `name` may be left out:
+//!
+//! ```ron
+//! (ladders: [(
+//!     name: "spacing",
+//!     preset: "default",                     // or config: "file.ron"; neither: the methods of the command line
+//!     set: ["solver.max_bounces=8"],
+//!     axes: [(key: "grid.spacing_m", values: [1.0, 0.5]), (key: "encoding.irradiance", values: [f16, f32])],
+//! )])
+//! ```
+//!
+//! The axes are multiplied, the last one varies fastest.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use ron::value::RawValue;
+use serde::Deserialize;
+
+use super::SweepError;
+use crate::config::{Config, ConfigError, presets};
+use crate::input::read_file;
+
+/// Configurations of a sweep at most: more is a mistake in an axis.
+const MOST: usize = 4096;
+
+/// A configuration that ladders start from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Method {
+    pub name: String,
+    pub config: Config,
+}
+
+/// One configuration of a ladder.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rung {
+    pub label: String,
+    /// Keys and values in which it differs from the others of its ladder.
+    pub axes: Vec<(String, String)>,
+    pub config: Config,
+}
+
+/// One curve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ladder {
+    pub name: String,
+    /// Name of the method that it starts from.
+    pub method: String,
+    pub rungs: Vec<Rung>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LadderFile {
+    ladders: Vec<Entry>,
+    #[serde(skip)]
+    path: PathBuf,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    name: String,
+    #[serde(default)]
+    preset: Option<String>,
+    /// Relative to the ladder's own folder.
+    #[serde(default)]
+    config: Option<PathBuf>,
+    #[serde(default)]
+    set: Vec<String>,
+    #[serde(default)]
+    axes: Vec<Axis>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Axis {
+    key: String,
+    /// RON as in a configuration file.
+    values: Vec<Box<RawValue>>,
+}
+
+impl LadderFile {
+    /// Reads and checks a file of ladders.
+    ///
+    /// # Errors
+    /// [`SweepError::Unreadable`], [`SweepError::Ladder`].
+    pub fn read(path: &Path) -> Result<LadderFile, SweepError> {
+        let unreadable = |cause| SweepError::Unreadable { path: path.to_owned(), cause };
+        let bytes = read_file(path).map_err(unreadable)?;
+        let text = String::from_utf8(bytes).map_err(|e| unreadable(std::io::Error::other(e.utf8_error())))?;
+        LadderFile::parse(&text, path)
+    }
+
+    fn parse(text: &str, path: &Path) -> Result<LadderFile, SweepError> {
+        let mut file: LadderFile = crate::config::from_ron(text, &path.display().to_string())?;
+        file.path = path.to_owned();
+        let mut names = BTreeSet::new();
+        let error = |what: String| SweepError::Ladder { place: path.display().to_string(), what };
+        if file.ladders.is_empty() {
+            return Err(error("it has no ladder; write (ladders: [(name: \"…\", axes: […])])".to_owned()));
+        }
+        for entry in &file.ladders {
+            let name = &entry.name;
+            if !names.insert(name) {
+                return Err(error(format!("two ladders are named '{name}'; rename one")));
+            }
+            if entry.preset.is_some() && entry.config.is_some() {
+                return Err(error(format!("ladder '{name}' has preset and config; remove one")));
+            }
+            if let Some(axis) = entry.axes.iter().find(|axis| axis.values.is_empty()) {
+                return Err(error(format!(
+                    "ladder '{name}': the axis {} has no values; give some or remove it",
+                    axis.key
+                )));
+            }
+        }
+        Ok(file)
+    }
+
+    /// Whether some ladder asks for the methods of the command line.
+    pub fn wants_methods(&self) -> bool {
+        self.ladders.iter().any(|entry| entry.preset.is_none() && entry.config.is_none())
+    }
+
+    /// Files that it refers to.
+    pub fn files(&self) -> Vec<PathBuf> {
+        self.ladders.iter().filter_map(|entry| entry.config.as_ref()).map(|file| self.beside(file)).collect()
+    }
+
+    fn beside(&self, file: &Path) -> PathBuf {
+        self.path.parent().unwrap_or(Path::new("")).join(file)
+    }
+
+    fn own_method(&self, entry: &Entry) -> Result<Option<Method>, SweepError> {
+        Ok(match (&entry.preset, &entry.config) {
+            (Some(name), _) => Some(Method { name: name.clone(), config: presets::find(name)? }),
+            (None, Some(file)) => {
+                let path = self.beside(file);
+                Some(Method { name: method_name(&path), config: Config::load(&path)? })
+            }
+            (None, None) => None,
+        })
+    }
+}
+
+/// What a configuration file is called in tables.
+pub fn method_name(path: &Path) -> String {
+    path.file_stem().map_or_else(|| path.display().to_string(), |stem| stem.to_string_lossy().into_owned())
+}
+
+/// All ladders: every one of the file that has no method of its own with each of `methods`; without a file one ladder with one
+/// configuration for each. `set` is applied before the axes, `finish` at the end.
+///
+/// # Errors
+/// Keys and values that the configuration does not know or take, too many configurations.
+pub fn expand(
+    file: Option<&LadderFile>,
+    methods: &[Method],
+    set: &[String],
+    finish: impl Fn(&mut Config),
+) -> Result<Vec<Ladder>, SweepError> {
+    let mut ladders = Vec::new();
+    let Some(file) = file else {
+        for method in methods {
+            let mut config = method.config.clone().with_overrides(set)?;
+            finish(&mut config);
+            let rung = Rung { label: method.name.clone(), axes: Vec::new(), config };
+            ladders.push(Ladder { name: method.name.clone(), method: method.name.clone(), rungs: vec![rung] });
+        }
+        return Ok(ladders);
+    };
+    let mut count = 0;
+    for entry in &file.ladders {
+        let place = format!("{}: ladder '{}'", file.path.display(), entry.name);
+        let product = entry.axes.iter().map(|axis| axis.values.len()).fold(1usize, usize::saturating_mul);
+        let own = file.own_method(entry)?;
+        let starts = own.as_ref().map_or(methods, std::slice::from_ref);
+        count += product.saturating_mul(starts.len());
+        if count > MOST {
+            return Err(SweepError::Ladder {
+                place,
+                what: format!("more than {MOST} configurations; shorten its axes"),
+            });
+        }
+        for method in starts {
+            let name = if starts.len() > 1 { format!("{}: {}", method.name, entry.name) } else { entry.name.clone() };
+            let base = method.config.clone().with_overrides(&entry.set).map_err(|e| in_ladder(&place, &e))?;
+            let base = base.with_overrides(set)?;
+            let rungs = rungs(&name, &base, &entry.axes, &finish).map_err(|e| in_ladder(&place, &e))?;
+            ladders.push(Ladder { name, method: method.name.clone(), rungs });
+        }
+    }
+    Ok(ladders)
+}
+
+/// The message of a configuration's mistake, which is no `--set` here.
+fn in_ladder(place: &str, error: &ConfigError) -> SweepError {
+    let what = error.to_string();
+    SweepError::Ladder { place: place.to_owned(), what: what.strip_prefix("--set ").unwrap_or(&what).to_owned() }
+}
+
+/// The product of the axes.
+fn rungs(name: &str, base: &Config, axes: &[Axis], finish: &dyn Fn(&mut Config)) -> Result<Vec<Rung>, ConfigError> {
+    let mut found = vec![(Vec::new(), base.clone())];
+    for axis in axes {
+        let mut next = Vec::with_capacity(found.len() * axis.values.len());
+        for (values, config) in &found {
+            for value in &axis.values {
+                let value = value.get_ron().trim();
+                let config = config.clone().with_overrides(&[format!("{}={value}", axis.key)])?;
+                let values: &Vec<(String, String)> = values;
+                next.push(([&values[..], &[(axis.key.clone(), value.to_owned())]].concat(), config));
+            }
+        }
+        found = next;
+    }
+    let rung = |(axes, mut config): (Vec<(String, String)>, Config)| {
+        finish(&mut config);
+        let short = |key: &str| key.rsplit('.').next().unwrap_or(key).to_owned();
+        let parts: Vec<String> = axes.iter().map(|(key, value)| format!("{}={value}", short(key))).collect();
+        let label = if parts.is_empty() { name.to_owned() } else { format!("{name} {}", parts.join(" ")) };
+        Rung { label, axes, config }
+    };
+    Ok(found.into_iter().map(rung).collect())
+}
+
+/// Refuses ladders that cannot share a reference: its light and its albedos are those of the scene.
+///
+/// # Errors
+/// [`SweepError::NotShared`].
+pub fn check_shared(ladders: &[Ladder]) -> Result<(), SweepError> {
+    let rungs = || ladders.iter().flat_map(|ladder| &ladder.rungs);
+    let Some(first) = rungs().next() else { return Ok(()) };
+    type Value = fn(&Config) -> String;
+    let keys: [(&'static str, Value); 3] = [
+        ("lights.punctual_scale", |c| c.lights.punctual_scale.to_string()),
+        ("lights.sky", |c| c.lights.sky.map_or("None".to_owned(), |sky| format!("{sky:?}"))),
+        ("solver.albedo_max", |c| c.solver.albedo_max.to_string()),
+    ];
+    for (key, value) in keys {
+        if let Some(other) = rungs().find(|rung| value(&rung.config) != value(&first.config)) {
+            return Err(SweepError::NotShared {
+                key,
+                first: value(&first.config),
+                first_label: first.label.clone(),
+                second: value(&other.config),
+                second_label: other.label.clone(),
+            });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::probe::query::VisibilitySettings;
+
+    fn expanded(text: &str) -> Result<Vec<Ladder>, SweepError> {
+        let methods = [Method { name: "default".to_owned(), config: Config::default() }];
+        expand(Some(&LadderFile::parse(text, Path::new("a.ron"))?), &methods, &["placement.rays=64".to_owned()], |_| {})
+    }
+
+    #[test]
+    fn axes_are_multiplied_and_take_any_value_of_a_configuration() {
+        let ladders = expanded(
+            "(ladders: [(name: \"a\", set: [\"solver.tolerance=1e-3\"], axes: [
+                (key: \"grid.spacing_m\", values: [1.0, 0.5]),
+                (key: \"query.visibility\", values: [none, moments(power: 3, floor: 0.05), surface(voxels_per_cell: 4)]),
+             ]), (name: \"b\", preset: \"path\")])",
+        )
+        .unwrap();
+        assert_eq!(ladders.len(), 2);
+        let rungs = &ladders[0].rungs;
+        assert_eq!(rungs.len(), 6);
+        assert_eq!(rungs[1].label, "a spacing_m=1.0 visibility=moments(power: 3, floor: 0.05)");
+        assert_eq!(rungs[1].config.query.visibility, VisibilitySettings::Moments { power: 3.0, floor: 0.05 });
+        assert_eq!((rungs[5].config.grid.spacing_m, rungs[5].config.solver.tolerance), (Some(0.5), 1e-3));
+        assert!(rungs.iter().all(|rung| rung.config.placement.rays == 64));
+        assert_eq!((ladders[1].method.as_str(), ladders[1].rungs.len()), ("path", 1));
+        assert_eq!(ladders[1].rungs[0].label, "b");
+    }
+
+    #[test]
+    fn a_method_each_where_there_are_several() {
+        let methods = ["one", "two"].map(|name| Method { name: name.to_owned(), config: Config::default() });
+        let file = "(ladders: [(name: \"a\", axes: [(key: \"grid.spacing_m\", values: [1, 2])])])";
+        let file = LadderFile::parse(file, Path::new("a.ron")).unwrap();
+        let ladders = expand(Some(&file), &methods, &[], |_| {}).unwrap();
+        assert_eq!(ladders.iter().map(|l| l.name.as_str()).collect::<Vec<_>>(), ["one: a", "two: a"]);
+        let plain = expand(None, &methods, &[], |_| {}).unwrap();
+        assert_eq!(plain.iter().map(|l| l.rungs[0].label.as_str()).collect::<Vec<_>>(), ["one", "two"]);
+    }
+
+    #[test]
+    fn mistakes_are_named_with_file_ladder_and_nearest_key() {
+        for (text, words) in [
+            (
+                "(ladders: [(name: \"a\", axes: [(key: \"grid.spacing\", values: [1])])])",
+                &["a.ron", "'a'", "'spacing_m'"][..],
+            ),
+            (
+                "(ladders: [(name: \"a\", axes: [(key: \"capture.resolution\", values: [8, 0])])])",
+                &["'a'", "1 to 1024"],
+            ),
+            ("(ladders: [(name: \"a\", axes: [(key: \"grid.spacing_m\", values: [])])])", &["no values"]),
+            ("(ladders: [(name: \"a\"), (name: \"a\")])", &["two ladders"]),
+            ("(ladders: [])", &["no ladder"]),
+            ("(ladder: [])", &["a.ron, line 1", "'ladders'"]),
+            ("(ladders: [(name: \"a\", preset: \"defualt\")])", &["default"]),
+        ] {
+            let error = expanded(text).unwrap_err().to_string();
+            assert!(words.iter().all(|word| error.contains(word)), "{text}: {error}");
+            assert!(!error.contains("--set"), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_the_reference_depends_on_must_agree() {
+        for (key, value) in
+            [("lights.punctual_scale", "2.0"), ("solver.albedo_max", "0.5"), ("lights.sky", "(1, 1, 1)")]
+        {
+            let text = format!("(ladders: [(name: \"a\"), (name: \"b\", set: [\"{key}={value}\"])])");
+            let error = check_shared(&expanded(&text).unwrap()).unwrap_err().to_string();
+            assert!(error.contains(key) && error.contains("'a'") && error.contains("'b'"), "{error}");
+        }
+        check_shared(&expanded("(ladders: [(name: \"a\"), (name: \"b\")])").unwrap()).unwrap();
+    }
+}

@@ -1,0 +1,197 @@
+//! One bake of a sweep, and what it is worth.
+
+use glam::Vec3;
+
+use super::SweepError;
+use super::store::{Key, Store, Stored};
+use crate::bake::{Baked, Circumstances, prepare};
+use crate::config::Config;
+use crate::evaluate::{BakedTruth, Comparison, Scenery, Shaded, runtime_bytes, volume_as_planned};
+use crate::image::Picture;
+use crate::probe::Volume;
+use crate::probe::file::{self, ProbeFile, SceneRecord};
+use crate::probe::query::Query;
+use crate::progress::Progress;
+use crate::report::sweep::{BakeTimes, MethodFigures, RunRecord, TruthRecord};
+use crate::shade::methods::Method;
+use crate::shade::reference::ReferenceSettings;
+
+/// What all runs share.
+pub struct Setting<'a, 's> {
+    pub scenery: Scenery<'a, 's>,
+    pub comparison: Comparison<'a>,
+    /// Mean of the reference that relative errors are relative to, W·m⁻²; `None` where it is black.
+    pub reference_mean: Option<f64>,
+    pub reference_settings: ReferenceSettings,
+    pub store: Store,
+    /// All that runs depend on besides configuration and seed, as text.
+    pub identity: String,
+}
+
+/// A finished run, new or from the store.
+#[derive(Debug, Clone)]
+pub struct Finished {
+    pub record: RunRecord,
+    /// Of its own visibility, per pixel, W·m⁻².
+    pub irradiance: Vec<Vec3>,
+    /// Whether it was there before.
+    pub kept: bool,
+}
+
+impl Setting<'_, '_> {
+    fn key(&self, kind: &str, config: &Config, seed: u64) -> Key {
+        Key::of(&[kind, &self.identity, &config.to_ron(), &seed.to_string()])
+    }
+
+    fn pixels(&self) -> usize {
+        self.scenery.view.width as usize * self.scenery.view.height as usize
+    }
+
+    /// The run of a configuration and a seed, from the store or else made and stored.
+    pub fn obtain(
+        &self,
+        label: &str,
+        config: &Config,
+        seed: u64,
+        warn: impl Fn(String),
+    ) -> Result<Finished, SweepError> {
+        let key = self.key("run", config, seed);
+        match self.store.load(&key, Some(self.pixels())) {
+            Stored::Found(record, Some(irradiance)) => return Ok(Finished { record, irradiance, kept: true }),
+            Stored::Damaged(what) => warn(format!("{what}; running '{label}' with seed {seed} again")),
+            Stored::Missing | Stored::Found(_, None) => {}
+        }
+        let bake = self.bake(label, config, seed)?;
+        let shaded = self.shade(config, &bake);
+        let record = self.record(seed, &bake, &shaded);
+        let irradiance = shaded[Method::On as usize].irradiance_indirect().to_vec();
+        let view = self.scenery.view;
+        self.store.save(&key, &record, Some(Picture::from_pixels(view.width, view.height, irradiance.clone())))?;
+        Ok(Finished { record, irradiance, kept: false })
+    }
+
+    /// The probes of a configuration lit by full paths: with their own visibility, and with exact visibility.
+    pub fn obtain_truth(
+        &self,
+        label: &str,
+        config: &Config,
+        seed: u64,
+        warn: impl Fn(String),
+    ) -> Result<TruthRecord, SweepError> {
+        let key = self.key("truth", config, seed);
+        match self.store.load(&key, None) {
+            Stored::Found(record, _) => return Ok(record),
+            Stored::Damaged(what) => warn(format!("{what}; lighting the probes of '{label}' again")),
+            Stored::Missing => {}
+        }
+        let bake = self.bake(label, config, seed)?;
+        let world = self.scenery.world;
+        let truth = BakedTruth::trace(world, config, &bake.volume, &self.reference_settings, Progress::hidden());
+        let file_query = Query { volume: &bake.volume, settings: &config.query };
+        let (masks, masks_s) = self.scenery.masks(&file_query);
+        let query = Query { volume: &truth.truth.volume, settings: &config.query };
+        let [_, mut on, mut ray] = self.scenery.shade(&query, &masks, masks_s, bake.bytes_per_probe, || {});
+        let figures = |shaded: &mut Shaded| {
+            shaded.compare(&self.comparison);
+            self.figures(shaded)
+        };
+        let record = TruthRecord {
+            visibility_on: figures(&mut on),
+            visibility_ray: figures(&mut ray),
+            baked: truth.report.figures,
+        };
+        self.store.save(&key, &record, None)?;
+        Ok(record)
+    }
+
+    /// Bakes, writes the file and reads it back: what is judged is what a user gets.
+    fn bake(&self, label: &str, config: &Config, seed: u64) -> Result<Bake, SweepError> {
+        let scene = self.scenery.world.scene;
+        let progress = Progress::hidden();
+        let circumstances = Circumstances { seed, memory_budget_bytes: None, progress, checkpoint: None };
+        let record = SceneRecord { name: scene.name.clone(), blake3: scene.blake3.clone() };
+        let baked = prepare(self.scenery.world, config, &circumstances).and_then(|p| p.bake(&circumstances, &record));
+        let baked = baked.map_err(|cause| SweepError::Bake { label: label.to_owned(), cause })?;
+        let path = self.store.scratch();
+        baked.container.write(&path)?;
+        let probes = file::read(&path)?;
+        // It has served; the next run would replace it.
+        let _ = std::fs::remove_file(&path);
+        let bytes_per_probe = runtime_bytes(&probes, config);
+        Ok(Bake { volume: volume_as_planned(&probes, scene), bytes_per_probe, baked, probes })
+    }
+
+    /// The three ways of treating visibility, compared with the reference.
+    fn shade(&self, config: &Config, bake: &Bake) -> [Shaded; 3] {
+        let query = Query { volume: &bake.volume, settings: &config.query };
+        let (masks, masks_s) = self.scenery.masks(&query);
+        let mut shaded = self.scenery.shade(&query, &masks, masks_s, bake.bytes_per_probe, || {});
+        shaded.iter_mut().for_each(|s| s.compare(&self.comparison));
+        shaded
+    }
+
+    fn record(&self, seed: u64, bake: &Bake, shaded: &[Shaded; 3]) -> RunRecord {
+        let Bake { baked, volume, .. } = bake;
+        let times = BakeTimes {
+            survey: baked.times.survey,
+            capture: baked.times.capture,
+            bounces: baked.times.bounces,
+            filter: baked.times.filter,
+            encode: baked.times.encode,
+        };
+        let probes = volume.states.len();
+        RunRecord {
+            seed,
+            probes,
+            probes_active: volume.active_count(),
+            probes_blake3: positions_hash(volume),
+            bytes_per_probe: bake.bytes_per_probe,
+            bytes: bake.bytes_per_probe * probes as f64,
+            file_bytes: bake.probes.file_bytes,
+            bake_s: times.total(),
+            time_s: times,
+            rays: baked.rays,
+            bounces: baked.solution.bounces.len().saturating_sub(1),
+            converged: baked.solution.converged,
+            methods: shaded.iter().map(|s| self.figures(s)).collect(),
+        }
+    }
+
+    fn figures(&self, shaded: &Shaded) -> MethodFigures {
+        let report = &shaded.report;
+        let measured = report.error.as_ref().map(|error| &error.all);
+        let error = measured.map(|m| m.figures).unwrap_or_default();
+        let relative = |value: Option<f64>| Some(value? / self.reference_mean?);
+        MethodFigures {
+            name: report.name.to_owned(),
+            shade_ms: report.shade_ms.median,
+            lookup_ns: report.lookup_ns,
+            irradiance_indirect_mean: report.irradiance_indirect_mean,
+            leak: report.leak,
+            error_relative: relative(error.rmse),
+            error,
+            standard_error: measured.map(|m| m.standard_error).unwrap_or_default(),
+            verdict: measured.and_then(|m| m.verdict).map(str::to_owned),
+        }
+    }
+}
+
+/// A bake and the file that came of it.
+struct Bake {
+    baked: Baked,
+    probes: ProbeFile,
+    volume: Volume,
+    bytes_per_probe: f64,
+}
+
+/// Where the probes stand, and which of them are baked.
+fn positions_hash(volume: &Volume) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for (position, state) in volume.positions.iter().zip(&volume.states) {
+        position.to_array().iter().for_each(|x| {
+            hasher.update(&x.to_le_bytes());
+        });
+        hasher.update(&[*state as u8]);
+    }
+    hasher.finalize().to_hex().to_string()
+}

@@ -150,7 +150,7 @@ pub fn prepare<'w, 's>(
     }
     let mut surface = surface.map(|measured| measured.table);
     if let (Some(table), VisibilitySettings::Surface { .. }) = (&mut surface, config.query.visibility) {
-        table.far = need::far_probes(&world.tracer, &grid, &placement, table);
+        table.far = need::far_probes(world, &grid, &placement, table);
     }
     // Only where shading asks this very table does a probe that no surface sees weigh nothing.
     if let (Some(table), VisibilitySettings::Surface { .. }) = (&surface, config.query.visibility)

@@ -63,7 +63,8 @@ fn bright_and_dim(format: &str, emission: &str) -> Baked {
     add(&mut gltf, &inside_of([0.1, -1.0, -1.0], [2.1, 1.0, 1.0]), diffuse([0.5; 3], [DIM; 3]));
     let words = "--set capture.resolution=16 --set grid.spacing_m=0.7 --set capture.emission=";
     let baked = bake(gltf, &format!("{words}{emission} --set encoding.irradiance={format}"));
-    baked.look("--look-at=0.3,0.1,0.1,2,0,0,80");
+    // Of light too dim for the format there is none to be seen.
+    baked.look_dark("--look-at=0.3,0.1,0.1,2,0,0,80");
     baked
 }
 

@@ -6,6 +6,7 @@ use super::rooms::{AT_FURNACE, furnace, in_furnace, under_root};
 use crate::common::Gltf;
 use crate::shapes::{add, diffuse, quad};
 
+/// Probes a unit apart with distance maps, for a room of this size.
 fn words(scale: f64) -> String {
     let cube = |x: f64| serde_json::json!([x, x, x]);
     let (low, high) = (cube(-0.5 * scale), cube(0.5 * scale));
@@ -16,6 +17,7 @@ fn words(scale: f64) -> String {
     )
 }
 
+/// 1.5 diagonals of a cell.
 fn clamp(scale: f64) -> f64 {
     1.5 * 3f64.sqrt() * scale
 }

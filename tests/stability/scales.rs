@@ -13,7 +13,7 @@ fn rooms(lamp: Lamp) -> Rooms {
 }
 
 fn baked(rooms: Rooms) -> Shared<Baked> {
-    shared(move || bake(rooms.gltf(), &rooms.words()))
+    shared(move || { let b = bake(rooms.gltf(), &rooms.words()); std::fs::copy(&b.scene, format!("out/dbg_{:e}.glb", rooms.scale)).unwrap(); std::fs::copy(&b.path, format!("out/dbg_{:e}.probes", rooms.scale)).unwrap(); b })
 }
 
 fn dark(baked: &Baked) -> Seen {

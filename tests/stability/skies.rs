@@ -7,8 +7,9 @@ use serde_json::json;
 use super::case::{Bound, Case};
 use super::look::{Baked, bake, bake_dark};
 use super::rooms::{AT_FURNACE, IN_FURNACE};
-use crate::common::Gltf;
-use crate::shapes::{add, add_light, diffuse, quad, room};
+use crate::common::{Folder, Gltf};
+use crate::program::{refuse, text};
+use crate::shapes::{add, add_light, diffuse, quad, room, save};
 
 /// Sums of a thousand f32.
 const ROUNDING: f64 = 1e-5;
@@ -23,11 +24,13 @@ pub fn cases() -> Vec<Case> {
     };
     let dark = |gltf: fn() -> Gltf| move || brightest(&bake_dark(gltf(), IN_FURNACE));
     vec![
-        Case::new("sky", "and nothing else", "every texel against π", Bound::AtMost(ROUNDING), sky(Gltf::new)),
         Case::new("sky", "and a square centimetre", "every texel against π", Bound::AtMost(ROUNDING), sky(speck)),
         Case::new("dark", "no light", "brightest texel and pixel", Bound::AtMost(0.0), dark(unlit_room)),
-        Case::new("dark", "light, but no surface", "brightest texel and pixel", Bound::AtMost(0.0), dark(lamp_alone)),
-        Case::new("dark", "nothing at all", "brightest texel and pixel", Bound::AtMost(0.0), dark(Gltf::new)),
+        Case::new("dark", "light, but no surface", "errors, on one line", Bound::AtMost(1.0), || refused(lamp_alone(), &[])),
+        Case::new("dark", "nothing at all", "errors, on one line", Bound::AtMost(1.0), || refused(Gltf::new(), &[])),
+        Case::new("sky", "and nothing else", "errors, on one line", Bound::AtMost(1.0), || {
+            refused(Gltf::new(), &["--env", "1,1,1"])
+        }),
         Case::new(
             "sky",
             "through a missing wall, as bright as the room",
@@ -63,6 +66,17 @@ fn lamp_alone() -> Gltf {
     let mut gltf = Gltf::new();
     add_light(&mut gltf, json!({ "type": "point", "intensity": 100.0 }), json!({ "translation": [0.1, 0.2, 0.3] }));
     gltf
+}
+
+/// What no surface is in cannot be lit: the program says so, on one line, and writes nothing. Returns the lines.
+fn refused(gltf: Gltf, words: &[&str]) -> f64 {
+    let folder = Folder::new();
+    let scene = save(gltf, &folder, "scene");
+    let output = folder.path().join("out.probes");
+    let message = refuse(&[&["bake", text(&scene), "-o", text(&output)], words].concat());
+    assert!(message.contains("scene.glb") && message.contains("no triangles"), "{message}");
+    assert!(!output.exists());
+    message.lines().count() as f64
 }
 
 fn brightest(baked: &Baked) -> f64 {

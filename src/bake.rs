@@ -299,6 +299,7 @@ impl Prepared<'_, '_> {
         let (container, losses) = file::encode(&volume, encoding, &config.to_ron(), scene, &record);
         times.encode = started.elapsed().as_secs_f64();
         numerics.clamped = losses.clamped.clone();
+        numerics.underflowed = losses.underflowed.clone();
         numerics.variance_floor_hits = losses.variance_floor_hits;
         Ok(Baked { volume, container, losses, solution, plan, rays, times, numerics, surface_bytes })
     }

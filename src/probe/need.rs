@@ -65,7 +65,11 @@ pub fn relocate(settler: &Settler, grid: &Grid, placement: &mut Placement, surve
         if !(0..8).any(|i| idle(grid.corner(grid.cell_base(cell), i).0 as usize)) {
             return Vec::new();
         }
-                table.entries(cell).filter(|entry| entry.mask == 0).map(|entry| need(settler.world, grid, table, cell, &entry)).collect()
+        table
+            .entries(cell)
+            .filter(|entry| entry.mask == 0)
+            .map(|entry| need(settler.world, grid, table, cell, &entry))
+            .collect()
     };
     let needs: Vec<Vec<Need>> = (0..grid.cell_count()).into_par_iter().map(needs_of_cell).collect();
     let moves: Vec<(usize, Vec3)> = (0..grid.probe_count())

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::case::{Bound, Case, Found, shared};
 use super::look::{Baked, bake, difference, worse};
-use super::rooms::{Lamp, Rooms, Wall, inside_of};
+use super::rooms::{Lamp, Rooms, SPACING_M, Wall, inside_of};
 use crate::common::Gltf;
 use crate::shapes::{add, add_light, diffuse, dot, quad};
 
@@ -29,7 +29,14 @@ pub fn cases() -> Vec<Case> {
 }
 
 fn rooms(radiance: f64) -> Rooms {
-    Rooms { albedo: 0.7, wall: Wall::Door(0.1), lamp: Lamp::Area(radiance), scale: 1.0, shift: 0.0 }
+    Rooms {
+        albedo: 0.7,
+        wall: Wall::Door(0.1),
+        lamp: Lamp::Area(radiance),
+        scale: 1.0,
+        shift: 0.0,
+        spacing_m: SPACING_M,
+    }
 }
 
 fn strengths() -> Vec<Case> {

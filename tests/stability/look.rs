@@ -124,7 +124,7 @@ impl Baked {
 
     fn see(&self, words: &str, lit: bool) -> Seen {
         let name = blake3::hash(words.as_bytes()).to_hex()[..16].to_owned();
-        let report = program::render(&self.folder, &self.scene, &self.path, &name, &format!("--size 32x18 {words}"));
+        let report = program::render(&self.folder, &self.scene, &self.path, &name, &format!("--size 64x36 {words}"));
         let pictures = self.folder.path().join(name);
         check_report(&report, lit);
         check_pictures(&pictures);
@@ -164,6 +164,13 @@ impl Seen {
         let image = LayeredImage::read_exr(&self.pictures.join(method).with_extension("exr"));
         image.unwrap_or_else(|e| panic!("{e}")).layer(layer).expect("the layer").to_vec()
     }
+}
+
+/// A `--look-at` with its places scaled.
+pub fn scaled(look_at: &str, scale: f64) -> String {
+    let numbers = look_at.trim_start_matches("--look-at=").split(',').map(|n| n.parse::<f64>().expect("a number"));
+    let place = |(i, n): (usize, f64)| format!("{:e}", if i < 6 { n * scale } else { n });
+    format!("--look-at={}", numbers.enumerate().map(place).collect::<Vec<_>>().join(","))
 }
 
 /// The larger one; a NaN stays, unlike with `f64::max`.

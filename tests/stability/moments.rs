@@ -1,7 +1,7 @@
 //! Distances: no half floats, no cancellation, and a miss is the longest distance there is.
 
 use super::case::{Bound, Case, Shared, shared};
-use super::look::{Baked, bake, bake_dark, worse};
+use super::look::{Baked, bake, bake_dark, scaled, worse};
 use super::rooms::{AT_FURNACE, furnace, in_furnace, under_root};
 use crate::common::Gltf;
 use crate::shapes::{add, diffuse, quad};
@@ -61,7 +61,7 @@ pub fn cases() -> Vec<Case> {
             "furnace with moments against πLe/(1 − ρ)",
             Bound::AtMost(2e-4 + 1e-5),
             move || {
-                there.look(&at_furnace(scale));
+                there.look(&scaled(AT_FURNACE, scale));
                 there.worst_mean(in_furnace(0.5))
             },
         ));
@@ -85,11 +85,4 @@ pub fn cases() -> Vec<Case> {
         },
     ));
     cases
-}
-
-fn at_furnace(scale: f64) -> String {
-    let numbers = AT_FURNACE.trim_start_matches("--look-at=").split(',').map(|n| n.parse::<f64>().expect("a number"));
-    let scaled: Vec<String> =
-        numbers.enumerate().map(|(i, n)| format!("{:e}", if i < 6 { n * scale } else { n })).collect();
-    format!("--look-at={}", scaled.join(","))
 }

@@ -76,7 +76,13 @@ pub struct Rooms {
     pub scale: f64,
     /// Of the root, metres.
     pub shift: f64,
+    /// Between probes, before scaling, metres.
+    pub spacing_m: f64,
 }
+
+/// Between probes of [`Rooms`], metres: no wall lies on a border of voxels, where rounding, which differs from scale to
+/// scale, would decide which of two neighbours answers; the wall at x = 0 lies in the middle between two planes of probes.
+pub const SPACING_M: f64 = 0.97;
 
 /// Side of [`Lamp::Area`], metres.
 pub const LAMP_M: f64 = 0.5;
@@ -127,9 +133,12 @@ impl Rooms {
         gltf
     }
 
-    /// Words of its bake with a metre of the unscaled rooms between probes.
+    /// Words of its bake.
     pub fn words(&self) -> String {
-        format!("--set encoding.irradiance=f32 --set capture.resolution=16 --set grid.spacing_m={:e}", self.scale)
+        format!(
+            "--set encoding.irradiance=f32 --set capture.resolution=16 --set grid.spacing_m={:e}",
+            self.spacing_m * self.scale
+        )
     }
 }
 

@@ -2,18 +2,18 @@
 
 use super::case::{Bound, Case, Shared, shared};
 use super::look::{Baked, Seen, bake, difference};
-use super::rooms::{Lamp, Rooms, SIZE_M, Wall};
+use super::rooms::{Lamp, Rooms, SIZE_M, SPACING_M, Wall};
 
 /// Results at another size: random numbers are the same, so only rays that pass an edge within rounding differ; each is
 /// a thousandth of what a probe sees.
 const EQUAL: f64 = 1e-3;
 
 fn rooms(lamp: Lamp) -> Rooms {
-    Rooms { albedo: 0.7, wall: Wall::Door(0.1), lamp, scale: 1.0, shift: 0.0 }
+    Rooms { albedo: 0.7, wall: Wall::Door(0.1), lamp, scale: 1.0, shift: 0.0, spacing_m: SPACING_M }
 }
 
 fn baked(rooms: Rooms) -> Shared<Baked> {
-    shared(move || { let b = bake(rooms.gltf(), &rooms.words()); std::fs::copy(&b.scene, format!("out/dbg_{:e}.glb", rooms.scale)).unwrap(); std::fs::copy(&b.path, format!("out/dbg_{:e}.probes", rooms.scale)).unwrap(); b })
+    shared(move || bake(rooms.gltf(), &rooms.words()))
 }
 
 fn dark(baked: &Baked) -> Seen {

@@ -26,7 +26,9 @@ pub fn cases() -> Vec<Case> {
     vec![
         Case::new("sky", "and a square centimetre", "every texel against π", Bound::AtMost(ROUNDING), sky(speck)),
         Case::new("dark", "no light", "brightest texel and pixel", Bound::AtMost(0.0), dark(unlit_room)),
-        Case::new("dark", "light, but no surface", "errors, on one line", Bound::AtMost(1.0), || refused(lamp_alone(), &[])),
+        Case::new("dark", "light, but no surface", "errors, on one line", Bound::AtMost(1.0), || {
+            refused(lamp_alone(), &[])
+        }),
         Case::new("dark", "nothing at all", "errors, on one line", Bound::AtMost(1.0), || refused(Gltf::new(), &[])),
         Case::new("sky", "and nothing else", "errors, on one line", Bound::AtMost(1.0), || {
             refused(Gltf::new(), &["--env", "1,1,1"])

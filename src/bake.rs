@@ -26,9 +26,10 @@ use crate::probe::map::{OctahedralMaps, fill_with_border};
 use crate::probe::need;
 use crate::probe::placement::{Placement, ProbeState, Settler, place};
 use crate::probe::query::VisibilitySettings;
-use crate::probe::solver::{Captures, Solution, Solver};
+use crate::probe::solver::{self, Solution, State};
 use crate::probe::surface_visibility::SurfaceVisibility;
 use crate::probe::survey::Measured;
+use crate::probe::sweep::{Captures, Sweep};
 use crate::probe::{Grid, Volume};
 use crate::progress::Progress;
 use crate::report::bake::{Numerics, Rays, Times};
@@ -249,16 +250,15 @@ impl Prepared<'_, '_> {
         times.filter += started.elapsed().as_secs_f64();
 
         let started = Instant::now();
-        let bar = circumstances.progress.stage("bounces", config.solver.max_bounces as usize);
-        let solver = Solver {
+        let bar = circumstances.progress.stage("bounces", config.solver.most() as usize);
+        let sweep = Sweep {
             captures: &captures,
             kernel: &kernel,
             query: &config.query,
-            settings: &config.solver,
             gathers_emission: config.capture.emission == EmissionTransport::Gathered,
         };
         let identity = checkpoint::identity(&scene.blake3, circumstances.seed, &config.to_ron());
-        let mut progress = Solution::default();
+        let mut progress = State::default();
         if let Some(Checkpoint { path, resume: true, .. }) = &circumstances.checkpoint
             && path.exists()
         {
@@ -266,9 +266,9 @@ impl Prepared<'_, '_> {
         }
         let mut saved = Ok(());
         let mut last_saved = Instant::now();
-        let mut solution = solver.solve(&mut volume, progress, |progress, volume| {
-            bar.set_position(progress.bounces.len() as u64);
-            let residual = progress.bounces.last().map_or(0.0, |b| b.residual);
+        let mut solution = solver::solve(&sweep, &config.solver, &mut volume, progress, |progress, volume| {
+            bar.set_position(progress.solution.bounces.len() as u64);
+            let residual = progress.solution.bounces.last().map_or(0.0, |b| b.residual);
             bar.set_message(format!("residual {residual:.1e}"));
             if let Some(Checkpoint { path, interval, .. }) = &circumstances.checkpoint
                 && last_saved.elapsed() >= *interval
@@ -286,7 +286,7 @@ impl Prepared<'_, '_> {
         numerics.non_finite += solution.non_finite;
         let done = solution.bounces.len().saturating_sub(1) as u32;
         let mut plan = self.plan.clone();
-        plan.add_bounces(done, config.solver.max_bounces, solution.converged, times.bounces);
+        plan.add_bounces(done, &config.solver, solution.converged, times.bounces);
 
         let started = Instant::now();
         if config.plan == PlanMode::KeepEverything {

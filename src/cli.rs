@@ -277,8 +277,9 @@ fn parse_exposure(text: &str) -> Result<f32, String> {
 }
 
 fn parse_positive(text: &str) -> Result<f32, String> {
-    let number: Option<f32> = text.parse().ok().filter(|x: &f32| x.is_finite() && *x > 0.0);
-    number.ok_or_else(|| "write a positive number".into())
+    let range = f32::MIN_POSITIVE..=f32::MAX;
+    let number: Option<f32> = text.parse().ok().filter(|x| range.contains(x));
+    number.ok_or_else(|| format!("write a number from {:.1e} to {:.1e}", range.start(), range.end()))
 }
 
 fn parse_size(text: &str) -> Result<u64, String> {

@@ -10,6 +10,7 @@ use crate::light::World;
 use crate::probe::Grid;
 use crate::probe::placement::{Placement, ProbeState};
 use crate::probe::query::VisibilitySettings;
+use crate::probe::solver::SolverSettings;
 use crate::probe::surface_visibility::SurfaceVisibility;
 use crate::scene::{AlphaMode, Environment, Scene};
 
@@ -65,16 +66,16 @@ impl Plan {
     }
 
     /// The plan's line about bounces, known only afterwards.
-    pub fn add_bounces(&mut self, done: u32, most: u32, converged: bool, bounces_s: f64) {
-        let saved = most.saturating_sub(done);
+    pub fn add_bounces(&mut self, done: u32, settings: &SolverSettings, converged: bool, bounces_s: f64) {
+        let saved = settings.max_bounces.map_or(0, |most| most.saturating_sub(done));
         let per_bounce = bounces_s / f64::from(done.max(1));
         self.lines.push(Line {
             stage: "bounces",
-            kept: !(converged && saved > 0),
-            reason: if converged {
-                format!("{done} bounces; what the others would add is below the tolerance")
-            } else {
-                format!("all {most} bounces; the tolerance was not reached")
+            kept: !converged,
+            reason: match settings.max_bounces {
+                _ if converged => format!("{done} sweeps; what further bounces would add is below the tolerance"),
+                Some(most) if most == done => format!("all {most} bounces; the tolerance was not reached"),
+                _ => format!("all {done} sweeps; the tolerance was not reached"),
             },
             saved_bytes: None,
             saved_s: (converged && saved > 0).then_some(per_bounce * f64::from(saved)),

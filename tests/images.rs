@@ -97,7 +97,7 @@ fn what_cannot_be_written_or_read_is_named() {
     assert!(!path.exists());
     let missing = Picture::read_exr(&path).unwrap_err().to_string();
     assert!(missing.contains("picture.exr") && missing.contains("check the path"), "{missing}");
-    assert!(matches!(Picture::read_exr(folder.path()), Err(ImageError::NotAFile { .. })));
+    assert!(Picture::read_exr(folder.path()).unwrap_err().to_string().contains("not a regular file"));
     fs::write(&path, b"not an exr at all").unwrap();
     assert!(matches!(Picture::read_exr(&path), Err(ImageError::Damaged { .. })));
     // Layers without colour to fall back on.

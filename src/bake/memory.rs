@@ -4,6 +4,7 @@
 use crate::config::Config;
 use crate::memory::{TooLittleMemory, available_bytes};
 use crate::probe::Grid;
+use crate::probe::anderson::History;
 use crate::probe::capture::ProbeCapture;
 use crate::probe::filter::{FilterSettings, Kernel};
 use crate::probe::query::VisibilitySettings;
@@ -38,7 +39,7 @@ pub struct Memory {
     pub survey: u64,
     /// Filters from captures to maps.
     pub kernels: u64,
-    /// Maps of irradiance and distance with their copies.
+    /// Maps of irradiance and distance with their copies, and what the solver remembers of sweeps.
     pub maps: u64,
     /// Captures that are traced at the same time.
     pub in_flight: u64,
@@ -64,11 +65,13 @@ impl Memory {
             kernels += Kernel::bytes(capture.resolution, filter.distance_resolution, filter.distance_exponent);
         }
         let moments = if has_distance { capture.resolution.pow(2) as u64 * MOMENTS_BYTES } else { 0 };
+        let interior = probes * filter.irradiance_resolution.pow(2) as u64;
+        let history = if config.solver.may_accelerate() { History::bytes(interior) } else { 0 };
         Memory {
             probes: probes * PROBE_BYTES,
             survey: voxels.map_or(0, |voxels| survey::estimated_bytes(mesh, grid, voxels)),
             kernels,
-            maps: probes * (texels(filter.irradiance_resolution) * irradiance + distance),
+            maps: probes * (texels(filter.irradiance_resolution) * irradiance + distance) + history,
             in_flight: (surfels_bytes(config) + moments) * rayon::current_num_threads() as u64,
         }
     }

@@ -2,17 +2,18 @@
 
 use std::time::Instant;
 
-use glam::{Vec3, Vec3A};
+use glam::{Vec2, Vec3, Vec3A};
 use rayon::prelude::*;
 
 use super::memory::{EMITTED_BYTES, SURFEL_BYTES, surfels_bytes};
 use super::{Budgeted, CHUNK_BYTES, Circumstances, Prepared};
 use crate::math::fibonacci;
-use crate::memory::{TooLittleMemory, resident_bytes};
+use crate::memory::{TooLittleMemory, peak_memory_bytes, resident_bytes};
 use crate::probe::capture::ProbeCapture;
 use crate::probe::filter::Kernel;
 use crate::probe::map::OctahedralMaps;
-use crate::probe::solver::Solver;
+use crate::probe::solver::SolverSettings;
+use crate::probe::sweep::Sweep;
 use crate::trace::Ray;
 
 /// Probes traced to predict.
@@ -34,6 +35,8 @@ pub struct Prediction {
     pub map_bytes: u64,
     /// What the process takes now: scene, acceleration structure, survey's tables.
     pub resident_bytes: u64,
+    /// The most that loading the scene and surveying it took: all of that is done.
+    pub survey_bytes: u64,
 }
 
 impl Prediction {
@@ -43,20 +46,30 @@ impl Prediction {
     }
 
     pub fn memory_bytes(&self) -> u64 {
-        self.capture_bytes + self.map_bytes + self.resident_bytes
+        (self.capture_bytes + self.map_bytes + self.resident_bytes).max(self.survey_bytes)
     }
 }
 
 impl Prepared<'_, '_> {
     /// Foretells time and memory from some of the probes, spread evenly.
     pub fn predict(&self, circumstances: &Circumstances) -> Prediction {
+        // Before this estimate itself takes any.
+        let (resident_bytes, survey_bytes) = (resident_bytes(), peak_memory_bytes());
         let config = self.config;
         let capture = self.capture(circumstances);
         // Large captures are alike, and few of them fit into memory.
         let fitting = (CHUNK_BYTES / surfels_bytes(config).max(1)) as usize;
         let (pilot, share) = self.pilot(fitting.clamp(1, PILOT));
+        let distance_kernel = self.distance_kernel();
         let started = Instant::now();
-        let traced: Vec<ProbeCapture> = pilot.par_iter().map(|&p| self.trace(&capture, p)).collect();
+        let trace = |&probe: &usize| {
+            let mut captured = self.trace(&capture, probe);
+            // Filtered at once, and not kept.
+            let distances = std::mem::take(&mut captured.distances);
+            std::hint::black_box(distance_kernel.as_ref().map(|kernel| kernel.distance(&distances)));
+            captured
+        };
+        let traced: Vec<ProbeCapture> = pilot.par_iter().map(trace).collect();
         let capture_s = started.elapsed().as_secs_f64() * share;
         let bytes = traced.iter().map(ProbeCapture::bytes).sum::<u64>() as f64 * share;
 
@@ -70,11 +83,10 @@ impl Prepared<'_, '_> {
         pilot.iter().zip(traced).for_each(|(&probe, capture)| stored[probe] = Some(capture));
         let trace = |probe: usize| self.trace(&capture, probe);
         let kernel = Kernel::cosine(config.capture.resolution, filter.irradiance_resolution);
-        let solver = Solver {
+        let sweep = Sweep {
             captures: &Budgeted { stored, trace: &trace },
             kernel: &kernel,
             query: &config.query,
-            settings: &config.solver,
             gathers_emission: false,
         };
         let zero = OctahedralMaps::new(
@@ -83,6 +95,9 @@ impl Prepared<'_, '_> {
             config.encoding.border,
             Vec3A::ZERO,
         );
+        let distance = distance_kernel.map(|_| {
+            OctahedralMaps::new(self.grid.probe_count(), filter.distance_resolution, config.encoding.border, Vec2::ZERO)
+        });
         let mut retraced_s = 0.0;
         let budget = circumstances.memory_budget_bytes.unwrap_or(u64::MAX);
         if bytes > 0.0 && bytes > budget as f64 {
@@ -91,11 +106,12 @@ impl Prepared<'_, '_> {
         Prediction {
             survey_s: self.survey_s,
             capture_s,
-            bounce_s: solver.time_sweep(&self.volume(zero, None), &pilot) * share + retraced_s,
-            bounces: expected_bounces(ratio, f64::from(config.solver.tolerance), config.solver.max_bounces),
+            bounce_s: sweep.time(&self.volume(zero, distance), &pilot) * share + retraced_s,
+            bounces: expected_sweeps(ratio, &config.solver),
             capture_bytes: (bytes as u64).min(budget),
             map_bytes: self.memory.standing(),
-            resident_bytes: resident_bytes(),
+            resident_bytes,
+            survey_bytes,
         }
     }
 
@@ -141,8 +157,13 @@ impl Prepared<'_, '_> {
     }
 }
 
-/// Bounces after which a geometric series in `ratio` leaves less than `tolerance` of the light.
-fn expected_bounces(ratio: f64, tolerance: f64, most: u32) -> u32 {
+/// Sweeps that combining them takes at most, by and large: 4 to 8 in the scenes of the project, 12 for stiff ones.
+const ACCELERATED_SWEEPS: u32 = 12;
+
+/// Sweeps after which a geometric series in `ratio` leaves less than the tolerance of the light.
+fn expected_sweeps(ratio: f64, settings: &SolverSettings) -> u32 {
+    let most = settings.most().min(if settings.may_accelerate() { ACCELERATED_SWEEPS } else { u32::MAX });
+    let tolerance = f64::from(settings.tolerance);
     if ratio <= 0.0 || tolerance <= 0.0 {
         return if ratio <= 0.0 { most.min(1) } else { most };
     }
@@ -158,10 +179,15 @@ mod tests {
     #[test]
     fn the_number_of_bounces_follows_from_the_albedo() {
         // 0.5¹⁴ < 10⁻⁴ < 0.5¹³.
-        assert_eq!(expected_bounces(0.5, 1e-4, 64), 14);
-        assert_eq!(expected_bounces(0.999, 1e-4, 64), 64);
-        assert_eq!(expected_bounces(0.0, 1e-4, 64), 1);
-        assert_eq!(expected_bounces(0.5, 0.0, 64), 64);
-        assert_eq!(expected_bounces(0.5, 1e-4, 0), 0);
+        let expected = |ratio, tolerance, most| {
+            let settings = SolverSettings { max_bounces: Some(most), tolerance, ..Default::default() };
+            expected_sweeps(ratio, &settings)
+        };
+        assert_eq!(expected(0.5, 1e-4, 64), 14);
+        assert_eq!(expected(0.999, 1e-4, 64), 64);
+        assert_eq!(expected(0.0, 1e-4, 64), 1);
+        assert_eq!(expected(0.5, 0.0, 64), 64);
+        assert_eq!(expected(0.5, 1e-4, 0), 0);
+        assert_eq!(expected_sweeps(0.999, &SolverSettings::default()), ACCELERATED_SWEEPS);
     }
 }

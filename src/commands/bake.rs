@@ -18,7 +18,7 @@ use crate::plan::Line;
 use crate::probe::checkpoint;
 use crate::probe::file::SceneRecord;
 use crate::probe::layout;
-use crate::report::bake::{BakeReport, BytesPerProbe, SCHEMA};
+use crate::report::bake::{BakeReport, BytesPerProbe, SCHEMA, SolverReport};
 use crate::report::format;
 use crate::report::header::Header;
 use crate::report::table::{Column, Table};
@@ -39,7 +39,7 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     let threads = set_threads(args.trace.threads)?;
 
     let started = Instant::now();
-    console.say(format!("configuration: {}", origin_of(args)));
+    tell::configuration(console, &args.config);
     let scene = load_scene(path, &args.trace, &config, console)?;
     check_apart_from(&scene, &outputs)?;
     let load_s = started.elapsed().as_secs_f64();
@@ -118,15 +118,6 @@ fn list_presets(console: &Console) -> Result<()> {
     console.print(&lines.join("\n"))
 }
 
-/// Where the configuration in effect comes from.
-fn origin_of(args: &BakeArgs) -> String {
-    let base = match (&args.config.config, &args.config.preset) {
-        (Some(path), _) => path.display().to_string(),
-        (None, preset) => format!("preset {}", preset.as_deref().unwrap_or("default")),
-    };
-    args.config.set.iter().fold(base, |text, set| format!("{text}, --set {set}"))
-}
-
 /// Probes away from the scene can be meant, for a plain below them; more often a unit or an axis is wrong.
 fn warn_about_bounds(config: &Config, scene: &Scene, console: &Console) {
     let (Some(bounds), Some((low, high))) = (config.grid.bounds, scene.mesh.bounds()) else { return };
@@ -156,6 +147,7 @@ fn dry_run(prepared: &Prepared, circumstances: &Circumstances, console: &Console
             "predicted_capture_bytes": p.capture_bytes,
             "predicted_map_bytes": p.map_bytes,
             "predicted_scene_bytes": p.resident_bytes,
+            "predicted_survey_bytes": p.survey_bytes,
             "plan": prepared.plan.lines,
         });
         return console.print(&serde_json::to_string_pretty(&report)?);
@@ -164,7 +156,7 @@ fn dry_run(prepared: &Prepared, circumstances: &Circumstances, console: &Console
     console.print(&format!(
         "{} probes, {active} of them to bake\n\
          about {}: survey {}, capture {}, {} bounces of {} each\n\
-         about {} of memory: captures {}, maps and filters {}, scene and tables {}",
+         about {} of memory: captures {}, maps and filters {}, scene and tables {}; before them, up to the survey, {}",
         prepared.grid.probe_count(),
         format::seconds(p.time_s()),
         format::seconds(p.survey_s),
@@ -175,6 +167,7 @@ fn dry_run(prepared: &Prepared, circumstances: &Circumstances, console: &Console
         format::bytes(p.capture_bytes),
         format::bytes(p.map_bytes),
         format::bytes(p.resident_bytes),
+        format::bytes(p.survey_bytes),
     ))
 }
 
@@ -232,6 +225,7 @@ fn report(
         bounces: baked.solution.bounces.clone(),
         converged: baked.solution.converged,
         spectral_radius_estimate: baked.solution.spectral_radius_estimate,
+        solver: SolverReport::of(&baked.solution),
         numerics: baked.numerics.clone(),
         plan: baked.plan.lines.clone(),
     }
@@ -262,7 +256,7 @@ fn warn_about(report: &BakeReport, console: &Console) {
         console.say(format!("{count} value(s) of tensor '{tensor}' are too small for its format and stored as 0"));
     }
     if !report.converged {
-        console.warn("the bounces did not converge; raise solver.max_bounces or solver.tolerance");
+        console.warn("the bounces did not converge; raise solver.max_sweeps or solver.tolerance");
     }
     for (tensor, &count) in numerics.clamped.iter().filter(|c| *c.1 > 0) {
         console.warn(format!("{count} value(s) of tensor '{tensor}' are beyond its format's range and clamped"));
@@ -278,7 +272,7 @@ fn summary(report: &BakeReport, output: &Path) -> String {
         ("probes (active)", format!("{} ({})", report.probes, report.probes_active)),
         ("rays", format!("{} M", format::significant((report.rays.primary + report.rays.shadow) as f64 / 1e6, 3))),
         ("ray rate", rate(report.rays_per_s)),
-        ("bounces", format!("{}", report.bounces.len().saturating_sub(1))),
+        ("bounces", bounces(report)),
         ("load and build", format::seconds(t.load + t.accel_build)),
         ("survey", format::seconds(t.survey)),
         ("capture", format::seconds(t.capture)),
@@ -297,6 +291,15 @@ fn summary(report: &BakeReport, output: &Path) -> String {
         ]);
     }
     format!("{}\n{}\nwrote {}", table, plan_summary(&report.plan), output.display())
+}
+
+/// How many sweeps, and what they leave.
+fn bounces(report: &BakeReport) -> String {
+    let sweeps = report.bounces.len().saturating_sub(1);
+    match report.solver.accelerated {
+        0 => sweeps.to_string(),
+        _ => format!("all, by {sweeps} sweeps"),
+    }
 }
 
 fn plan_summary(lines: &[Line]) -> String {

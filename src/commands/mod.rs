@@ -14,6 +14,7 @@ use anyhow::{Context, Result};
 
 use crate::cli::{Cli, Command, ConfigArgs, OutputFlags, TraceArgs};
 use crate::config::{Config, presets};
+use crate::memory::peak_memory_bytes;
 use crate::output::{Named, check_apart, write_atomically};
 use crate::progress::Progress;
 use crate::scene::{self, EnvironmentSource, LoadOptions, Scene};
@@ -118,13 +119,6 @@ fn load_scene(path: &Path, trace: &TraceArgs, config: &Config, console: &Console
         console.warn(format!("{}: {warning}", path.display()));
     }
     Ok(scene)
-}
-
-/// Largest resident memory of this process so far.
-fn peak_memory_bytes() -> u64 {
-    let usage = nix::sys::resource::getrusage(nix::sys::resource::UsageWho::RUSAGE_SELF);
-    // Linux counts in KiB.
-    usage.map_or(0, |u| u.max_rss() as u64 * 1024)
 }
 
 /// Writes a report as JSON.

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 
 use super::camera::cameras;
 use super::{
@@ -37,6 +37,7 @@ pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
     if args.view.camera.as_deref() == Some("all") {
         bail!("--camera all: a reference is one picture; name one camera");
     }
+    check_extension(&args.output)?;
     let config = resolve_config(&args.config, &args.trace)?;
     let outputs: Vec<Named> = [Named::new("-o", &args.output)]
         .into_iter()
@@ -47,6 +48,7 @@ pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
     let threads = set_threads(args.trace.threads)?;
 
     let started = Instant::now();
+    tell::configuration(console, &args.config);
     let mut times = ReferenceTimes::default();
     let scene = load_scene(&args.scene, &args.trace, &config, console)?;
     check_apart_from(&scene, &outputs)?;
@@ -55,6 +57,7 @@ pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
     let accel_started = Instant::now();
     let world = World::new(&scene, config.lights.punctual_scale, config.solver.albedo_max)?;
     times.accel_build = accel_started.elapsed().as_secs_f64();
+    tell::accel(console, times.accel_build);
 
     let settings = ReferenceSettings {
         spp: args.spp,
@@ -77,14 +80,23 @@ pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
     let (spp_resumed, rays_before) = previous.as_ref().map_or((0, 0), |p| (p.film.blocks * BLOCK, p.rays.total()));
 
     let mut tracing = Tracing::new(&world, camera, size.width, size.height, &settings, previous);
-    if tracing.remaining() == 0 {
-        console.warn(format!("{} has {spp_resumed} samples per pixel already", args.output.display()));
+    tell::reference_begins(console, &camera.name, size, settings.rounded_spp(), spp_resumed);
+    let is_complete = tracing.remaining() == 0;
+    if is_complete {
+        console.warn(format!(
+            "{} has {spp_resumed} samples per pixel already: there is nothing to add; raise --spp for more",
+            args.output.display()
+        ));
     }
     times.trace = trace(&mut tracing, args, &identity, console)?;
     let reference = tracing.develop();
-    let write_started = Instant::now();
-    reference.write(&args.output, &identity)?;
-    times.write = write_started.elapsed().as_secs_f64();
+    tell::traced(console, reference.spp, reference.rays, times.trace);
+    if !is_complete {
+        let write_started = Instant::now();
+        reference.write(&args.output, &identity)?;
+        times.write = write_started.elapsed().as_secs_f64();
+        tell::written(console, &args.output);
+    }
     times.total = started.elapsed().as_secs_f64();
 
     if reference.non_finite > 0 {
@@ -103,18 +115,32 @@ pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
         spp_resumed,
         rays: Rays { primary: rays.primary, shadow: rays.shadow },
         time_s: times,
-        rays_per_s: (times.trace > 0.0).then(|| (rays.total() - rays_before) as f64 / times.trace),
+        rays_per_s: (!is_complete && times.trace > 0.0).then(|| (rays.total() - rays_before) as f64 / times.trace),
         noise: reference.noise.map(noise_report),
         non_finite: reference.non_finite,
         peak_memory_bytes: peak_memory_bytes(),
     };
     if let Some(path) = &args.report {
         write_json(path, &report)?;
+        tell::written(console, path);
     }
     if console.json {
         return console.print(&serde_json::to_string_pretty(&report)?);
     }
-    console.print(&summary(&report, &args.output))
+    let outcome = if is_complete { "nothing to add to" } else { "wrote" };
+    console.print(&format!("{}\n{outcome} {}", summary(&report), args.output.display()))
+}
+
+/// An EXR by the name of another format would be found out by whoever opens it.
+fn check_extension(output: &Path) -> Result<()> {
+    let is_exr = output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"));
+    ensure!(
+        is_exr,
+        "-o {}: references are OpenEXR files; give it the extension .exr: {}",
+        output.display(),
+        output.with_extension("exr").display()
+    );
+    Ok(())
 }
 
 /// What `--resume` continues.
@@ -169,7 +195,7 @@ fn noise_report(noise: Noise) -> NoiseReport {
     }
 }
 
-fn summary(report: &ReferenceReport, output: &Path) -> String {
+fn summary(report: &ReferenceReport) -> Table {
     let mut table = Table::new(&[("reference", Column::Text), ("", Column::Number)]);
     let millions = |n: u64| format!("{} M", format::significant(n as f64 / 1e6, 3));
     let noise = report.noise.as_ref();
@@ -186,5 +212,5 @@ fn summary(report: &ReferenceReport, output: &Path) -> String {
     ] {
         table.push([name.to_owned(), value]);
     }
-    format!("{table}\nwrote {}", output.display())
+    table
 }

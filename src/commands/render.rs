@@ -72,6 +72,7 @@ impl BakedTruth {
         let (figures, standard_error) = baked::measure(volume, &truth);
         let paths_per_hit = u64::from(paths) * truth.runs.len() as u64;
         let report = BakedReport { figures, standard_error, paths_per_hit, time_s: started.elapsed().as_secs_f64() };
+        tell::truth(console, paths_per_hit, report.time_s);
         BakedTruth { truth, report }
     }
 }

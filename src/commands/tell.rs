@@ -4,12 +4,24 @@ use std::path::Path;
 
 use super::Console;
 use crate::bake::{Baked, Prepared};
+use crate::cli::{ConfigArgs, Size};
+use crate::light::sampled::RayCount;
 use crate::plan::Line;
 use crate::probe::file::ProbeFile;
 use crate::probe::placement::ProbeState;
 use crate::report::format;
 use crate::report::render::RenderReport;
 use crate::scene::Scene;
+
+/// Where the configuration in effect comes from.
+pub fn configuration(console: &Console, args: &ConfigArgs) {
+    let base = match (&args.config, &args.preset) {
+        (Some(path), _) => path.display().to_string(),
+        (None, preset) => format!("preset {}", preset.as_deref().unwrap_or("default")),
+    };
+    let text = args.set.iter().fold(base, |text, set| format!("{text}, --set {set}"));
+    console.say(format!("configuration: {text}"));
+}
 
 pub fn scene(console: &Console, path: &Path, scene: &Scene, load_s: f64) {
     console.say(format!(
@@ -97,6 +109,29 @@ pub fn rendered(console: &Console, report: &RenderReport) {
             format::seconds(method.ray_ms / 1e3),
         ));
     }
+}
+
+pub fn reference_begins(console: &Console, camera: &str, size: Size, spp: u32, spp_resumed: u32) {
+    let Size { width, height } = size;
+    console.say(format!(
+        "camera {camera}: {width}×{height} pixels, {spp} samples each, {spp_resumed} of them there already"
+    ));
+}
+
+/// `rays` are those of all samples, resumed ones too.
+pub fn traced(console: &Console, spp: u32, rays: RayCount, seconds: f64) {
+    console.say(format!(
+        "reference: {spp} samples per pixel, in all {} primary and {} shadow rays, traced in {}",
+        rays.primary,
+        rays.shadow,
+        format::seconds(seconds),
+    ));
+}
+
+/// The file's probes, lit by full paths.
+pub fn truth(console: &Console, paths_per_hit: u64, seconds: f64) {
+    console
+        .say(format!("probes by full paths: {paths_per_hit} from every hit, traced in {}", format::seconds(seconds)));
 }
 
 pub fn written(console: &Console, path: &Path) {

@@ -84,7 +84,11 @@ impl Config {
             rule("lights.sky", format!("{sky:?}"), holds, POSITIVE_RULE);
         }
         rule("solver.tolerance", s.tolerance.to_string(), not_negative(s.tolerance), POSITIVE_RULE);
-        rule("solver.max_bounces", s.max_bounces.to_string(), s.max_bounces <= 1 << 20, "use 0 to 1048576");
+        if let Some(bounces) = s.max_bounces {
+            rule("solver.max_bounces", bounces.to_string(), bounces <= 1 << 20, "use 0 to 1048576, or None for all");
+        }
+        let sweeps = s.max_sweeps;
+        rule("solver.max_sweeps", sweeps.to_string(), (1..=1 << 20).contains(&sweeps), "use 1 to 1048576");
         let albedo = s.albedo_max;
         rule(
             "solver.albedo_max",

@@ -12,8 +12,6 @@ use crate::output::OutputError;
 pub enum ImageError {
     #[error("cannot open {path}: {cause}; check the path")]
     Open { path: PathBuf, cause: io::Error },
-    #[error("cannot open {path}: it is not a regular file; give the name of a file")]
-    NotAFile { path: PathBuf },
     #[error("cannot read {path}: {reason}; is it a whole {format} file? Export or copy it again")]
     Damaged { path: PathBuf, format: &'static str, reason: String },
     #[error("cannot read {path}: {reason}; save it as a plain {format} file")]

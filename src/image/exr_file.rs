@@ -15,6 +15,7 @@ use exr::meta::header::Header;
 use exr::prelude::Compression;
 
 use super::error::ImageError;
+use crate::input::open_file;
 
 const FORMAT: &str = "OpenEXR";
 
@@ -51,14 +52,10 @@ impl<'a> ExrFile<'a> {
     /// Opens the file and refuses headers that it is too short for.
     pub(super) fn open(path: &'a Path) -> Result<ExrFile<'a>, ImageError> {
         let open_error = |cause| ImageError::Open { path: path.to_owned(), cause };
-        let file = File::open(path).map_err(open_error)?;
-        let metadata = file.metadata().map_err(open_error)?;
-        if !metadata.is_file() {
-            return Err(ImageError::NotAFile { path: path.to_owned() });
-        }
+        let file = open_file(path).map_err(open_error)?;
+        let file_bytes = file.metadata().map_err(open_error)?.len();
         // Relaxed: real files bend the rules of the header. The data is held to them.
         let reader = exr::block::read(BufReader::new(file), false).map_err(|error| exr_error(path, error))?;
-        let file_bytes = metadata.len();
         for header in reader.headers() {
             if !is_plausible(header, file_bytes) {
                 let (width, height) = (header.layer_size.width(), header.layer_size.height());

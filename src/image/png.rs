@@ -1,6 +1,5 @@
 //! PNG, 8 bits per channel.
 
-use std::fs::File;
 use std::io::{self, BufReader, Write};
 use std::path::Path;
 
@@ -9,6 +8,7 @@ use image::{ExtendedColorType, ImageEncoder, ImageFormat, ImageReader};
 
 use super::error::ImageError;
 use super::picture::Picture8;
+use crate::input::open_file;
 use crate::output::write_atomically;
 
 const FORMAT: &str = "PNG";
@@ -43,7 +43,7 @@ impl Picture8 {
     /// # Errors
     /// A file that cannot be opened, is damaged, or is larger than the decoder's limit of 512 MiB.
     pub fn read_png(path: &Path) -> Result<Picture8, ImageError> {
-        let file = File::open(path).map_err(|cause| ImageError::Open { path: path.to_owned(), cause })?;
+        let file = open_file(path).map_err(|cause| ImageError::Open { path: path.to_owned(), cause })?;
         let decoded = ImageReader::with_format(BufReader::new(file), ImageFormat::Png).decode().map_err(|error| {
             ImageError::Damaged { path: path.to_owned(), format: FORMAT, reason: error.to_string() }
         })?;

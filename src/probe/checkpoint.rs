@@ -1,18 +1,21 @@
-//! What an interrupted bake leaves behind: the probes' irradiance after the last finished sweep.
+//! What an interrupted bake leaves behind: the probes' irradiance after the last finished sweep, and what the solver
+//! remembers of the sweeps before.
 //!
 //! Captures are traced again on resumption — the same seed gives the same — so only the sweeps are saved.
 
 use std::path::{Path, PathBuf};
 
-use glam::Vec3A;
+use glam::{DVec3, Vec3, Vec3A};
 use safetensors::Dtype;
 
+use super::anderson::History;
 use super::container::{Container, FileError, Tensor};
-use super::solver::Solution;
+use super::solver::{Solution, State};
+use super::sweep::Field;
 use super::volume::Volume;
 
 /// Value of the metadata key `format`.
-const FORMAT: &str = "lightprobe-resume/1";
+const FORMAT: &str = "lightprobe-resume/2";
 
 /// Where the checkpoint of an output lies.
 pub fn path_for(output: &Path) -> PathBuf {
@@ -22,17 +25,22 @@ pub fn path_for(output: &Path) -> PathBuf {
 }
 
 /// Writes a checkpoint. `identity` names scene, configuration and seed: whatever the result depends on.
-pub fn write(path: &Path, identity: &str, progress: &Solution, volume: &Volume) -> Result<(), FileError> {
+pub fn write(path: &Path, identity: &str, progress: &State, volume: &Volume) -> Result<(), FileError> {
     let mut container = Container::default();
     let texels = &volume.irradiance.texels;
-    let mut bytes = Vec::with_capacity(texels.len() * 12);
-    texels.iter().flat_map(|t| t.to_array()).for_each(|x| bytes.extend(x.to_le_bytes()));
-    let tensor = Tensor { dtype: Dtype::F32, shape: vec![texels.len(), 3], bytes };
-    container.tensors.insert("irradiance".into(), tensor);
+    container.tensors.insert("irradiance".into(), tensor(texels.iter().map(|&t| t.into())));
+    if let Some(history) = &progress.history {
+        let (fields, noise) = history.fields();
+        for (i, field) in fields.into_iter().enumerate() {
+            container.tensors.insert(field_name(i), tensor(field.iter().copied()));
+        }
+        let noise: Vec<[f64; 3]> = noise.into_iter().map(|n| n.to_array()).collect();
+        container.metadata.insert("history".into(), serde_json::to_string(&noise).unwrap_or_default());
+    }
     container.metadata.insert("format".into(), FORMAT.into());
     container.metadata.insert("identity".into(), identity.into());
     // Plain numbers: nothing in them can fail to serialise.
-    container.metadata.insert("progress".into(), serde_json::to_string(progress).unwrap_or_default());
+    container.metadata.insert("progress".into(), serde_json::to_string(&progress.solution).unwrap_or_default());
     container.write(path).map(|_| ())
 }
 
@@ -42,14 +50,42 @@ pub fn identity(scene_blake3: &str, seed: u64, config: &str) -> String {
 }
 
 /// Reads a checkpoint into the volume and returns how far it had come.
-pub fn read(path: &Path, identity: &str, volume: &mut Volume) -> Result<Solution, FileError> {
-    let (progress, texels) = load(path, identity)?;
-    if texels.len() != volume.irradiance.texels.len() {
-        let what = "its irradiance is not that of this grid".to_owned();
-        return Err(FileError::NoCheckpoint { path: path.to_owned(), what });
-    }
-    volume.irradiance.texels = texels;
-    Ok(progress)
+pub fn read(path: &Path, identity: &str, volume: &mut Volume) -> Result<State, FileError> {
+    let (solution, container) = load(path, identity)?;
+    let unusable = |what: &str| FileError::NoCheckpoint { path: path.to_owned(), what: what.to_owned() };
+    let texels = field(&container, "irradiance").filter(|texels| texels.len() == volume.irradiance.texels.len());
+    let texels = texels.ok_or_else(|| unusable("its irradiance is not that of this grid"))?;
+    volume.irradiance.texels = texels.into_iter().map(Vec3A::from).collect();
+    let interior = volume.active_count() * volume.irradiance.resolution.pow(2);
+    let history = match container.metadata.get("history") {
+        None => None,
+        Some(noise) => Some(
+            history(&container, noise, interior).ok_or_else(|| unusable("its earlier sweeps are not of this grid"))?,
+        ),
+    };
+    Ok(State { solution, history })
+}
+
+fn history(container: &Container, noise: &str, interior: usize) -> Option<History> {
+    let noise: Vec<[f64; 3]> = serde_json::from_str(noise).ok()?;
+    let fields = (0..).map_while(|i| field(container, &field_name(i))).collect();
+    History::from_fields(interior, fields, noise.into_iter().map(DVec3::from).collect())
+}
+
+/// Name of the tensor that holds one of the fields that the solver remembers.
+fn field_name(i: usize) -> String {
+    format!("history.{i}")
+}
+
+fn tensor(values: impl ExactSizeIterator<Item = Vec3>) -> Tensor {
+    let shape = vec![values.len(), 3];
+    Tensor { dtype: Dtype::F32, shape, bytes: values.flat_map(|v| v.to_array()).flat_map(f32::to_le_bytes).collect() }
+}
+
+fn field(container: &Container, name: &str) -> Option<Field> {
+    let tensor = container.tensors.get(name).filter(|tensor| tensor.dtype == Dtype::F32)?;
+    let numbers: Vec<f32> = tensor.bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
+    Some(numbers.as_chunks::<3>().0.iter().map(|&t| t.into()).collect())
 }
 
 /// Refuses what [`read`] will not be able to go on from, before the captures are traced again.
@@ -69,7 +105,7 @@ fn is_checkpoint(container: &Container) -> bool {
     container.metadata.get("format").is_some_and(|format| format == FORMAT)
 }
 
-fn load(path: &Path, identity: &str) -> Result<(Solution, Vec<Vec3A>), FileError> {
+fn load(path: &Path, identity: &str) -> Result<(Solution, Container), FileError> {
     let unusable = |what: &str| FileError::NoCheckpoint { path: path.to_owned(), what: what.to_owned() };
     let container = Container::read(path).map_err(|error| match error {
         FileError::Damaged { what, .. } => unusable(&format!("it is damaged or no resume file ({what})")),
@@ -81,10 +117,10 @@ fn load(path: &Path, identity: &str) -> Result<(Solution, Vec<Vec3A>), FileError
     if container.metadata.get("identity").map(String::as_str) != Some(identity) {
         return Err(FileError::OtherBake { path: path.to_owned() });
     }
-    let progress = container.metadata.get("progress").and_then(|text| serde_json::from_str(text).ok());
-    let progress = progress.ok_or_else(|| unusable("its progress is unreadable"))?;
-    let tensor = container.tensors.get("irradiance").filter(|tensor| tensor.dtype == Dtype::F32);
-    let tensor = tensor.ok_or_else(|| unusable("it holds no irradiance"))?;
-    let numbers: Vec<f32> = tensor.bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
-    Ok((progress, numbers.as_chunks::<3>().0.iter().map(|t| Vec3A::from(*t)).collect()))
+    let solution = container.metadata.get("progress").and_then(|text| serde_json::from_str(text).ok());
+    let solution = solution.ok_or_else(|| unusable("its progress is unreadable"))?;
+    if field(&container, "irradiance").is_none() {
+        return Err(unusable("it holds no irradiance"));
+    }
+    Ok((solution, container))
 }

@@ -78,6 +78,12 @@ impl<T: Copy + Add<Output = T> + Mul<f32, Output = T>> OctahedralMaps<T> {
     }
 }
 
+/// Where the interior texel with the number `o`, counted row by row, lies in a map with this border.
+pub fn interior_texel(resolution: usize, border: usize) -> impl Fn(usize) -> usize + Copy {
+    let side = resolution + 2 * border;
+    move |o| (o / resolution + border) * side + o % resolution + border
+}
+
 /// Copies an interior map (row by row, `resolution`²) into one with a border and fills the border.
 pub fn fill_with_border<T: Copy>(interior: &[T], resolution: usize, border: usize, out: &mut [T]) {
     let side = resolution + 2 * border;

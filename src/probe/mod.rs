@@ -3,6 +3,7 @@
 //! A bake is these modules in this order: [`grid`] → [`placement`] → [`capture`] → [`solver`] → [`filter`] →
 //! [`encode`] → [`file`]; [`volume`] and [`query`] are what shading uses, and the solver with it.
 
+pub mod anderson;
 pub mod capture;
 pub mod checkpoint;
 pub mod container;
@@ -20,6 +21,7 @@ pub mod solver;
 pub mod surface_visibility;
 pub mod surfel;
 pub mod survey;
+pub mod sweep;
 pub mod truth;
 pub mod volume;
 

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::header::Header;
 use crate::plan::Line;
-use crate::probe::solver::Bounce;
+use crate::probe::solver::{Bounce, Solution};
 
 /// Version of the report's layout.
 pub const SCHEMA: &str = "lightprobe-bake/1";
@@ -27,7 +27,9 @@ pub struct BakeReport {
     pub bytes_per_probe: BytesPerProbe,
     pub bounces: Vec<Bounce>,
     pub converged: bool,
+    /// Largest Ritz value of the bounce operator, or the ratio of the last two changes where sweeps are not combined.
     pub spectral_radius_estimate: Option<f64>,
+    pub solver: SolverReport,
     pub numerics: Numerics,
     pub plan: Vec<Line>,
 }
@@ -64,6 +66,39 @@ pub struct BytesPerProbe {
     pub file: f64,
     /// Tensor size ÷ probes.
     pub tensors: BTreeMap<String, f64>,
+}
+
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct SolverReport {
+    /// Sweeps over all probes, the first without a bounce.
+    pub operator_applications: usize,
+    /// Of these, from a combination of earlier sweeps.
+    pub accelerated: usize,
+    /// Largest texel that a sweep makes of irradiance 1 everywhere: a bound of the spectral radius, at most the largest
+    /// albedo.
+    pub operator_norm: Option<f64>,
+    /// No texel is farther than this from the solution of the bounces' equations, W·m⁻²; storage apart.
+    pub error_bound: Option<f64>,
+    /// The same ÷ largest irradiance texel.
+    pub error_bound_relative: Option<f64>,
+    /// Channels of sweeps that went on plainly because the residual had risen.
+    pub plain_fallbacks: u64,
+    /// Texels of sweeps that went on plainly because a combination was negative there.
+    pub negative_texels: u64,
+}
+
+impl SolverReport {
+    pub fn of(solution: &Solution) -> SolverReport {
+        SolverReport {
+            operator_applications: solution.bounces.len(),
+            accelerated: solution.bounces.iter().filter(|bounce| bounce.accelerated).count(),
+            operator_norm: solution.norm_bound(),
+            error_bound: solution.error_bound,
+            error_bound_relative: solution.error_bound_relative,
+            plain_fallbacks: solution.plain_fallbacks,
+            negative_texels: solution.negative_texels,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Default, Serialize)]

@@ -8,6 +8,7 @@ use super::error::terms::fold;
 use crate::math::color::luminance;
 use crate::math::octahedral::{solid_angle_density, texel_centre};
 use crate::probe::Volume;
+use crate::probe::map::interior_texel;
 use crate::probe::truth::Truth;
 
 /// Sums run over all texels of active probes by their solid angle, in luminance. All are shares of ΣE_path.
@@ -62,7 +63,8 @@ pub fn measure(volume: &Volume, truth: &Truth) -> (BakedFigures, BakedFigures) {
 /// The figures against all runs of the truth but one.
 fn figures(volume: &Volume, truth: &Truth, without: Option<usize>) -> BakedFigures {
     let maps = &volume.irradiance;
-    let (resolution, border, side) = (maps.resolution, maps.border, maps.side());
+    let resolution = maps.resolution;
+    let interior = interior_texel(resolution, maps.border);
     let used: Vec<usize> = (0..truth.runs.len()).filter(|&run| Some(run) != without).collect();
     let n = used.len() as f64;
     let mut sums = Sums::default();
@@ -74,7 +76,7 @@ fn figures(volume: &Volume, truth: &Truth, without: Option<usize>) -> BakedFigur
             let (column, row) = (o % resolution, o / resolution);
             let oct = glam::Vec2::new(texel_centre(column, resolution), texel_centre(row, resolution));
             let weight = f64::from(solid_angle_density(oct));
-            let stored = volume.curve.decode(maps.probe(p)[(row + border) * side + column + border]);
+            let stored = volume.curve.decode(maps.probe(p)[interior(o)]);
             let of = |e: Vec3A| f64::from(luminance(e.into()));
             let mean = used.iter().map(|&run| of(truth.runs[run][p][o])).sum::<f64>() / n;
             let spread = used.iter().map(|&run| (of(truth.runs[run][p][o]) - mean).powi(2)).sum::<f64>();

@@ -26,7 +26,7 @@ pub struct ReferenceReport {
     pub rays: Rays,
     /// Of this run.
     pub time_s: ReferenceTimes,
-    /// Rays of this run ÷ `time_s.trace`.
+    /// Rays of this run ÷ `time_s.trace`; `null` where there was nothing to add.
     pub rays_per_s: Option<f64>,
     /// Of `irradiance_indirect`, W·m⁻²; absent below two blocks of 16 samples.
     pub noise: Option<NoiseReport>,

@@ -11,6 +11,7 @@ use crate::memory::check_memory;
 use crate::output::{Named, check_apart, check_folder, check_outputs};
 use crate::scene::Camera;
 use crate::shade::outlook::Outlook;
+use crate::shade::points::has_blend;
 
 /// Memory that a render takes at its peak, per pixel and per point in the picture: the slope of peak memory over the
 /// number of pixels, which is 579 B where there is only sky and 758 B where each pixel shows one point, rounded up.
@@ -19,8 +20,10 @@ const POINT_BYTES: f64 = 200.0;
 /// Points beyond the first of a pixel stand in lists that grow by doubling.
 const FURTHER_POINT_BYTES: f64 = 700.0;
 
-/// What a traced reference takes besides.
-const REFERENCE_PIXEL_BYTES: f64 = 600.0;
+/// What a traced reference takes besides: 718 B without variances, 857 B with them, rounded up.
+const REFERENCE_PIXEL_BYTES: f64 = 900.0;
+/// The same with translucent surfaces, where all layers are accumulated: 1583 B, rounded up.
+const LAYERED_REFERENCE_PIXEL_BYTES: f64 = 1700.0;
 
 /// Files that a camera's folder gets.
 const PICTURES: &[&str] = &[
@@ -72,6 +75,10 @@ pub fn check_view(args: &RenderArgs, world: &World, camera: &Camera, console: &C
     }
     let points = f64::from(outlook.points_per_pixel);
     let of_points = points.min(1.0) * POINT_BYTES + (points - 1.0).max(0.0) * FURTHER_POINT_BYTES;
-    let of_reference = if args.reference.is_some() { REFERENCE_PIXEL_BYTES * points.max(1.0) } else { 0.0 };
+    let of_reference = match args.reference {
+        None => 0.0,
+        Some(_) if has_blend(world) => LAYERED_REFERENCE_PIXEL_BYTES * points.max(1.0),
+        Some(_) => REFERENCE_PIXEL_BYTES,
+    };
     Ok(check_memory(args.view.size, PIXEL_BYTES + of_points + of_reference)?)
 }

@@ -9,6 +9,7 @@ use anyhow::{Context, Result, bail};
 
 use super::Run;
 use crate::cli::RenderArgs;
+use crate::commands::tell;
 use crate::image::LayeredImage;
 use crate::math::blocks::BLOCK;
 use crate::output::write_atomically;
@@ -93,6 +94,7 @@ impl Reference {
         let started = Instant::now();
         let traced = reference::trace(run.world, camera, width, height, settings, run.console.progress, None);
         let time_s = started.elapsed().as_secs_f64();
+        tell::traced(run.console, traced.spp, traced.rays, time_s);
         if traced.non_finite > 0 {
             run.console.warn(format!("{} samples of the reference were not finite and count as 0", traced.non_finite));
         }

@@ -34,6 +34,10 @@ fn resuming_gives_the_bytes_of_one_run() {
     // Enough already: nothing changes.
     made(&folder, "parts.exr", "--spp 48 --seed 5 --resume");
     assert_eq!(std::fs::read(&path).unwrap(), whole);
+    let enough = ["--size", "24x16", "--spp", "48", "--seed", "5", "--resume"];
+    let enough = succeed(&[&["reference", text(&scene("two_rooms_open")), "-o", text(&path)][..], &enough].concat());
+    assert!(enough.stderr.contains("has 96 samples per pixel already"), "{}", enough.stderr);
+    assert!(!enough.stdout.contains("M/s") && !enough.stdout.contains("wrote"), "{}", enough.stdout);
     // Nothing to resume: begins anew.
     let anew = made(&folder, "anew.exr", "--spp 96 --seed 5 --resume");
     assert_eq!(std::fs::read(anew).unwrap(), whole);
@@ -98,7 +102,16 @@ fn arguments_are_checked_first() {
     for more in [&["--spp", "0"][..], &["--spp", "-3"], &["--spp", "x"], &[], &["--spp", "16", "--transport", "x"]] {
         fails(more);
     }
+    for value in ["1e39", "0", "-1", "NaN", "1e-60"] {
+        let message = fails(&["--spp", "16", "--firefly-clamp", value]).stderr;
+        assert!(message.contains("from 1.2e-38 to 3.4e38"), "{value}: {message}");
+    }
     assert!(one_error(&fails(&["--spp", "16", "--camera", "all"])).contains("--camera all"));
+    for name in ["a.png", "a"] {
+        let other = folder.path().join(name);
+        let message = refuse(&["reference", text(&rooms), "-o", text(&other), "--spp", "16"]);
+        assert!(message.contains("the extension .exr") && message.contains("a.exr"), "{message}");
+    }
     assert!(one_error(&fails(&["--spp", "16", "--camera", "nobody"])).contains("nobody"));
     let nowhere = refuse(&["reference", text(&rooms), "-o", "/nowhere/a.exr", "--spp", "16"]);
     assert!(nowhere.contains("/nowhere"), "{nowhere}");

@@ -1,0 +1,412 @@
+//! Anderson acceleration of a fixed-point iteration x ← g(x), per colour channel (Anderson 1965; Walker & Ni 2011).
+//!
+//! From the last iterates it takes the combination whose residuals f = g(x) − x cancel best, and goes on from there. For a
+//! linear g this is what GMRES does (Walker & Ni, section 2); unlike it, it also serves methods whose queries are not
+//! linear. The same pairs of differences tell the operator's largest eigenvalue by the method of Rayleigh and Ritz.
+//!
+//! Memory: 2·(columns + 1) + 1 fields.
+
+use glam::{DVec3, Vec3};
+use nalgebra::{Complex, DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::sweep::Field;
+
+/// Most differences that are kept.
+const WINDOW: usize = 10;
+/// Fewest: below, acceleration is hardly better than plain iteration.
+const MIN_WINDOW: usize = 3;
+/// Memory that differences may take as far as [`MIN_WINDOW`] allows; a constant, so that no result depends on the machine.
+const WINDOW_BYTES: u64 = 512 << 20;
+
+/// Elements that one task sums: the sums' order does not depend on the number of threads.
+const CHUNK: usize = 4096;
+
+/// Rounding of one texel of a sweep, relative to the largest ones: single precision.
+const ROUNDING: f64 = f32::EPSILON as f64;
+
+/// Smallest eigenvalue of the normalised Gram matrix, relative to its largest, whose direction counts: the square of the
+/// sine between columns below which single precision cannot tell them apart.
+const INDEPENDENT: f64 = 1e-11;
+
+/// How far rounding may move an eigenvalue's estimate, relative to its distance from 1.
+const EIGENVALUE_PRECISION: f64 = 0.1;
+
+/// A pair of differences between successive iterates.
+#[derive(Debug, Clone, PartialEq)]
+struct Column {
+    /// Of residuals f.
+    df: Field,
+    /// Of values g(x).
+    dg: Field,
+    /// Share of rounding in the difference of iterates, per channel.
+    noise: DVec3,
+    /// Products with all columns from the oldest to this one.
+    dots: Vec<Dots>,
+}
+
+/// Inner products of two columns i ≤ j, per channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Dots {
+    ff: DVec3,
+    gg: DVec3,
+    /// f of column i with g of column j, and the other way round.
+    fg: DVec3,
+    gf: DVec3,
+}
+
+/// An estimate of the spectral radius.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ritz {
+    pub radius: f64,
+    /// ‖T·v − λ·v‖₂ for its vector v, ‖v‖₂ = 1: the smaller, the better the estimate.
+    pub residual: f64,
+}
+
+/// What the iteration remembers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct History {
+    window: usize,
+    /// Oldest first.
+    columns: Vec<Column>,
+    /// Residual and value of the last iterate.
+    last: Option<(Field, Field)>,
+    /// g(0), where the iteration began from 0.
+    origin: Option<Field>,
+}
+
+impl History {
+    /// For fields of so many texels.
+    pub fn new(texels: usize) -> History {
+        History { window: History::window(texels as u64), columns: Vec::new(), last: None, origin: None }
+    }
+
+    fn window(texels: u64) -> usize {
+        let column = 2 * size_of::<Vec3>() as u64 * texels;
+        ((WINDOW_BYTES / column.max(1)) as usize).clamp(MIN_WINDOW, WINDOW)
+    }
+
+    /// Most memory for fields of so many texels.
+    pub fn bytes(texels: u64) -> u64 {
+        size_of::<Vec3>() as u64 * texels * (2 * (History::window(texels) as u64 + 1) + 1)
+    }
+
+    /// Takes an iterate x and g(x) into account.
+    pub fn push(&mut self, x: &[Vec3], g: Field) {
+        let f = difference(&g, x);
+        if self.last.is_none() && x.iter().all(|x| *x == Vec3::ZERO) {
+            self.origin = Some(g.clone());
+        }
+        if let Some((last_f, last_g)) = self.last.take() {
+            let (df, dg) = (difference(&f, &last_f), difference(&g, &last_g));
+            if self.columns.len() == self.window {
+                self.columns.remove(0);
+                for column in &mut self.columns {
+                    column.dots.remove(0);
+                }
+            }
+            let dots = self.products(&df, &dg);
+            self.columns.push(Column { noise: noise(&dots, dot(x, x)), df, dg, dots });
+        }
+        self.last = Some((f, g));
+    }
+
+    /// Products of all columns with a pair of differences, and of this with itself.
+    fn products(&self, df: &[Vec3], dg: &[Vec3]) -> Vec<Dots> {
+        let with = |f: &[Vec3], g: &[Vec3]| Dots { ff: dot(f, df), gg: dot(g, dg), fg: dot(f, dg), gf: dot(g, df) };
+        self.columns.iter().map(|column| with(&column.df, &column.dg)).chain([with(df, dg)]).collect()
+    }
+
+    /// Forgets the differences: of an operator that is not linear, those from far away mislead.
+    pub fn forget(&mut self) {
+        self.columns.clear();
+    }
+
+    /// The next iterate: g(x) − Σ γᵢ·ΔGᵢ with the γ that minimise ‖f − Σ γᵢ·ΔFᵢ‖₂, for the channels that `accelerate`;
+    /// g(x) for the others, and in texels that would turn negative. The latter are counted.
+    pub fn next(&self, accelerate: [bool; 3]) -> (Field, u64) {
+        let Some((f, g)) = &self.last else { return (Field::new(), 0) };
+        let right: Vec<DVec3> = self.columns.iter().map(|column| dot(&column.df, f)).collect();
+        let per_channel: [Vec<f64>; 3] =
+            [0, 1, 2].map(|c| if accelerate[c] { self.gamma(&right, c) } else { Vec::new() });
+        let weight = |i: usize, c: usize| per_channel[c].get(i).copied().unwrap_or(0.0);
+        let weights: Vec<DVec3> =
+            (0..self.columns.len()).map(|i| DVec3::new(weight(i, 0), weight(i, 1), weight(i, 2))).collect();
+        let texel = |(o, g): (usize, &Vec3)| {
+            let mixed = self
+                .columns
+                .iter()
+                .zip(&weights)
+                .fold(g.as_dvec3(), |sum, (column, weight)| sum - *weight * column.dg[o].as_dvec3());
+            let negative = mixed.cmplt(DVec3::ZERO);
+            (DVec3::select(negative, g.as_dvec3(), mixed).as_vec3(), u64::from(negative.any()))
+        };
+        let mixed: Vec<(Vec3, u64)> = g.par_iter().enumerate().map(texel).collect();
+        let negative = mixed.iter().map(|(_, n)| n).sum();
+        (mixed.into_iter().map(|(e, _)| e).collect(), negative)
+    }
+
+    /// Weights of the columns in one channel; `right` are their products with f.
+    fn gamma(&self, right: &[DVec3], c: usize) -> Vec<f64> {
+        let n = right.len();
+        let product = |a: usize, b: usize| self.dots(a, b, c).ff;
+        let scale: Vec<f64> =
+            (0..n).map(|a| product(a, a)).map(|s| if s > 0.0 { 1.0 / s.sqrt() } else { 0.0 }).collect();
+        let gram = DMatrix::from_fn(n, n, |a, b| product(a, b) * scale[a] * scale[b]);
+        let Some(basis) = independent(gram, INDEPENDENT) else { return Vec::new() };
+        let right = DVector::from_fn(n, |a, _| right[a][c] * scale[a]);
+        let gamma = &basis * (basis.transpose() * right);
+        gamma.iter().zip(scale).map(|(g, s)| g * s).collect()
+    }
+
+    /// Largest absolute Ritz value of the operator over all channels: an estimate of its spectral radius. `None` before
+    /// there are two iterates whose difference is not mostly rounding.
+    ///
+    /// The differences span little of a slow mode that acceleration has removed early. The iterate itself, which is their
+    /// difference from 0, has most of it: (1 − T)⁻¹ has made the slow modes large in it.
+    ///
+    /// `gap` is a lower bound of the eigenvalue's distance from 1: what rounding could change by more than a little of it
+    /// is left out.
+    pub fn spectral_radius(&self, gap: f64) -> Option<Ritz> {
+        let from_origin = self.origin.as_ref().zip(self.last.as_ref()).map(|(origin, (f, g))| {
+            // At 0 residual and value are the same.
+            let (df, dg) = (difference(f, origin), difference(g, origin));
+            let dots = self.products(&df, &dg);
+            let noise = DVec3::splat(ROUNDING);
+            (dots, noise)
+        });
+        let mut columns: Vec<(&[Dots], DVec3)> = self.columns.iter().map(|c| (&c.dots[..], c.noise)).collect();
+        // With one difference alone it would be this one once more.
+        if let Some((dots, noise)) = from_origin.as_ref().filter(|_| columns.len() > 1) {
+            columns.push((dots, *noise));
+        }
+        let of_channel = |c: usize| largest_ritz_value(&columns, c, gap * EIGENVALUE_PRECISION);
+        (0..3).filter_map(of_channel).max_by(|a, b| a.radius.total_cmp(&b.radius))
+    }
+
+    /// Products of columns i and j.
+    fn dots(&self, i: usize, j: usize, c: usize) -> ChannelDots {
+        let d = if i > j { self.columns[i].dots[j] } else { self.columns[j].dots[i] };
+        channel(d, i > j, c)
+    }
+
+    /// All fields, for a checkpoint: f and g of the last iterate, then of each column, then g(0) where it is known; with
+    /// the columns' noise.
+    pub fn fields(&self) -> (Vec<&Field>, Vec<DVec3>) {
+        let last = self.last.iter().flat_map(|(f, g)| [f, g]);
+        let columns = self.columns.iter().flat_map(|column| [&column.df, &column.dg]);
+        (last.chain(columns).chain(&self.origin).collect(), self.columns.iter().map(|column| column.noise).collect())
+    }
+
+    /// The inverse of [`History::fields`]; `None` where they do not fit together.
+    pub fn from_fields(texels: usize, fields: Vec<Field>, noise: Vec<DVec3>) -> Option<History> {
+        let mut history = History::new(texels);
+        let pairs = if fields.is_empty() { 0 } else { noise.len() + 1 };
+        if fields.len() / 2 != pairs || pairs > history.window + 1 || fields.iter().any(|f| f.len() != texels) {
+            return None;
+        }
+        let mut fields = fields.into_iter();
+        history.last = fields.next().zip(fields.next());
+        for noise in noise {
+            let (df, dg) = fields.next().zip(fields.next())?;
+            let dots = history.products(&df, &dg);
+            history.columns.push(Column { df, dg, noise, dots });
+        }
+        history.origin = fields.next();
+        Some(history)
+    }
+}
+
+struct ChannelDots {
+    ff: f64,
+    gg: f64,
+    fg: f64,
+    gf: f64,
+}
+
+/// Products of columns i and j in one channel of those of the lower number with the higher, or `swapped`.
+fn channel(d: Dots, swapped: bool, c: usize) -> ChannelDots {
+    let (fg, gf) = if swapped { (d.gf, d.fg) } else { (d.fg, d.gf) };
+    ChannelDots { ff: d.ff[c], gg: d.gg[c], fg: fg[c], gf: gf[c] }
+}
+
+/// Share of rounding in a column whose products are these: of the iterate, against the difference of iterates.
+fn noise(dots: &[Dots], x_square: DVec3) -> DVec3 {
+    let Some(own) = dots.last() else { return DVec3::ONE };
+    let dx_square = own.gg - own.fg - own.gf + own.ff;
+    let share = |c: usize| if dx_square[c] > 0.0 { ROUNDING * (x_square[c] / dx_square[c]).sqrt() } else { 1.0 };
+    DVec3::new(share(0), share(1), share(2))
+}
+
+/// Of columns with their products with those before and with themselves, and their noise.
+///
+/// With ΔX = ΔG − ΔF, T·ΔX = ΔG. In an orthonormal basis W of the ΔX, I − T is −WᵀΔF: its eigenvalues are those of T from
+/// 1, and lose nothing where these are close to 1. Rounding moves them by less than `precision`.
+fn largest_ritz_value(columns: &[(&[Dots], DVec3)], c: usize, precision: f64) -> Option<Ritz> {
+    // Normalising directions enlarges rounding: by three at least it may.
+    let clean: Vec<usize> = (0..columns.len()).filter(|&i| 3.0 * columns[i].1[c] < precision).collect();
+    let n = clean.len();
+    let noisiest = clean.iter().map(|&i| columns[i].1[c]).fold(0.0, f64::max);
+    let dots = |a: usize, b: usize| {
+        let (i, j) = (clean[a], clean[b]);
+        channel(if i > j { columns[i].0[j] } else { columns[j].0[i] }, i > j, c)
+    };
+    let xx = DMatrix::from_fn(n, n, |a, b| {
+        let d = dots(a, b);
+        d.gg - d.fg - d.gf + d.ff
+    });
+    let scale = DVector::from_fn(n, |a, _| if xx[(a, a)] > 0.0 { 1.0 / xx[(a, a)].sqrt() } else { 0.0 });
+    let scaled = |m: DMatrix<f64>| DMatrix::from_fn(n, n, |a, b| m[(a, b)] * scale[a] * scale[b]);
+    // −ΔXₐ·ΔF_b.
+    let xf = DMatrix::from_fn(n, n, |a, b| {
+        let d = dots(a, b);
+        d.ff - d.gf
+    });
+    let threshold = (noisiest / precision).powi(2).max(INDEPENDENT);
+    let basis = independent(scaled(xx.clone()), threshold)?;
+    let projected = basis.transpose() * scaled(xf.clone()) * &basis;
+    // The smallest |λ| are of no interest, and complex ones are never the largest of an operator without negative
+    // elements (Perron, Frobenius): where one seems to be, the estimate is not ripe.
+    let values = projected.complex_eigenvalues();
+    let distance = |mu: &Complex<f64>| (1.0 - mu.re).hypot(mu.im);
+    let mu = values.iter().filter(|mu| mu.re.is_finite()).max_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+    let shifted = &projected - DMatrix::identity(basis.ncols(), basis.ncols()) * mu.re;
+    let svd = shifted.svd(false, true);
+    let vector = svd.v_t.map(|v_t| v_t.row(svd.singular_values.imin()).transpose())?;
+    let weights = (&basis * vector).component_mul(&scale);
+    let ff = DMatrix::from_fn(n, n, |a, b| dots(a, b).ff);
+    let form = |m: &DMatrix<f64>| weights.dot(&(m * &weights));
+    let residual = form(&ff) - 2.0 * mu.re * form(&xf) + mu.re * mu.re * form(&xx);
+    Some(Ritz { radius: distance(mu), residual: residual.max(0.0).sqrt().hypot(mu.im) })
+}
+
+/// W with Wᵀ·M·W = 1 for a positive semidefinite M, over its eigenvectors whose eigenvalue exceeds `threshold` of the
+/// largest; `None` where there is none.
+fn independent(gram: DMatrix<f64>, threshold: f64) -> Option<DMatrix<f64>> {
+    if gram.is_empty() || gram.iter().any(|x| !x.is_finite()) {
+        return None;
+    }
+    let eigen = gram.symmetric_eigen();
+    let largest = eigen.eigenvalues.max();
+    let kept: Vec<usize> =
+        (0..eigen.eigenvalues.len()).filter(|&i| largest > 0.0 && eigen.eigenvalues[i] > threshold * largest).collect();
+    let column = |i: &usize| eigen.eigenvectors.column(*i) / eigen.eigenvalues[*i].sqrt();
+    (!kept.is_empty()).then(|| DMatrix::from_columns(&kept.iter().map(column).collect::<Vec<_>>()))
+}
+
+fn difference(a: &[Vec3], b: &[Vec3]) -> Field {
+    a.par_iter().zip(b).map(|(a, b)| *a - *b).collect()
+}
+
+/// Inner product per channel, in f64, in an order of its own.
+fn dot(a: &[Vec3], b: &[Vec3]) -> DVec3 {
+    let chunk =
+        |(a, b): (&[Vec3], &[Vec3])| a.iter().zip(b).fold(DVec3::ZERO, |sum, (a, b)| sum + a.as_dvec3() * b.as_dvec3());
+    let sums: Vec<DVec3> = a.par_chunks(CHUNK).zip(b.par_chunks(CHUNK)).map(chunk).collect();
+    sums.into_iter().sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// x ← b + T·x in two rooms of `n` texels each: a texel keeps a share to itself, gives the rest to its room, and of
+    /// that a little to the other. The same in all channels, scaled.
+    struct Linear {
+        matrix: DMatrix<f64>,
+        right: DVector<f64>,
+    }
+
+    impl Linear {
+        /// Share of a texel's light that goes through the door, and that it keeps to itself.
+        const DOOR: f64 = 1e-3;
+        const OWN: f64 = 0.4;
+
+        /// With the eigenvalues albedo, albedo·(1 − 2·DOOR·(1 − OWN)) and albedo·OWN.
+        fn new(n: usize, albedo: f64) -> Linear {
+            let matrix = DMatrix::from_fn(2 * n, 2 * n, |i, j| {
+                let share = if i / n == j / n { 1.0 - Linear::DOOR } else { Linear::DOOR };
+                let own = if i == j { Linear::OWN } else { 0.0 };
+                albedo * (own + (1.0 - Linear::OWN) * share / n as f64)
+            });
+            // A lamp in the first room.
+            Linear { matrix, right: DVector::from_fn(2 * n, |i, _| if i < n { 1.0 + (i as f64).cos() } else { 0.0 }) }
+        }
+
+        fn apply(&self, x: &[Vec3]) -> Field {
+            let mapped = |c: usize| &self.matrix * DVector::from_fn(x.len(), |i, _| f64::from(x[i][c]));
+            let [r, g, b] = [0, 1, 2].map(mapped);
+            let at = |i: usize| DVec3::new(r[i], g[i], b[i]) + DVec3::new(1.0, 10.0, 0.0) * self.right[i];
+            (0..x.len()).map(|i| at(i).as_vec3()).collect()
+        }
+
+        fn solution(&self) -> DVector<f64> {
+            let n = self.right.len();
+            (DMatrix::identity(n, n) - &self.matrix).lu().solve(&self.right).unwrap()
+        }
+    }
+
+    #[test]
+    fn a_stiff_linear_system_is_solved_in_a_few_steps() {
+        let system = Linear::new(4, 0.999);
+        let mut history = History::new(8);
+        let mut x = vec![Vec3::ZERO; 8];
+        // Three distinct eigenvalues, and one step to begin with; rounding costs another or two.
+        for _ in 0..6 {
+            let g = system.apply(&x);
+            history.push(&x, g);
+            x = history.next([true; 3]).0;
+        }
+        let solution = system.solution();
+        let largest = solution.amax();
+        for (i, value) in x.iter().enumerate() {
+            let error = (f64::from(value.x) - solution[i]).abs() / largest;
+            // Rounding, some 2⁻²⁰ from sums of eight, is enlarged by 1/(1 − λ) = 1000.
+            assert!(error < 2e-3, "texel {i}: {} instead of {}", value.x, solution[i]);
+            assert!((f64::from(value.y) / 10.0 - solution[i]).abs() / largest < 2e-3);
+            assert_eq!(value.z, 0.0, "a channel without light stays dark");
+        }
+        let radius = history.spectral_radius(1e-3).unwrap().radius;
+        assert!((radius - 0.999).abs() < 2e-5, "{radius}");
+    }
+
+    #[test]
+    fn plain_channels_stay_plain_and_negative_texels_fall_back() {
+        let system = Linear::new(2, 0.9);
+        let mut history = History::new(4);
+        let mut x = vec![Vec3::ZERO; 4];
+        for _ in 0..3 {
+            let g = system.apply(&x);
+            history.push(&x, g.clone());
+            let (next, negative) = history.next([true, false, true]);
+            assert!(next.iter().zip(&g).all(|(n, g)| n.y == g.y));
+            assert!(next.iter().all(|n| n.cmpge(Vec3::ZERO).all()));
+            assert!(negative <= 4);
+            x = next;
+        }
+    }
+
+    #[test]
+    fn a_restored_history_goes_on_as_the_old_one() {
+        let system = Linear::new(2, 0.99);
+        let mut history = History::new(4);
+        let mut x = vec![Vec3::ZERO; 4];
+        for _ in 0..3 {
+            history.push(&x, system.apply(&x));
+            x = history.next([true; 3]).0;
+        }
+        let (fields, noise) = history.fields();
+        let fields: Vec<Field> = fields.into_iter().cloned().collect();
+        assert_eq!(History::from_fields(4, fields.clone(), noise.clone()).as_ref(), Some(&history));
+        assert_eq!(History::from_fields(3, fields, noise), None);
+    }
+
+    #[test]
+    fn the_window_shrinks_with_the_field() {
+        assert_eq!(History::window(1000), WINDOW);
+        assert_eq!(History::window(u64::from(u32::MAX)), MIN_WINDOW);
+        let texels = WINDOW_BYTES / 24 / 5;
+        assert_eq!(History::window(texels), 5);
+        assert_eq!(History::bytes(texels), texels * 12 * 13);
+    }
+}

@@ -1,0 +1,214 @@
+//! The bounce operator: one sweep takes the light from the probes to the surfaces they captured and back.
+//!
+//! With E the irradiance in the probes, one sweep gives `G[B⁰] + T·E`, `T = G[ρ/π·Q[E]]`: Q asks the probes at every
+//! captured hit with the method's own weights, G is the irradiance filter, B⁰ the radiance that hits reflect of light that
+//! did not pass through probes.
+
+use std::time::Instant;
+
+use glam::{Vec3, Vec3A};
+use rayon::prelude::*;
+
+use super::capture::ProbeCapture;
+use super::filter::Kernel;
+use super::map::{fill_with_border, interior_texel};
+use super::placement::ProbeState;
+use super::query::{Query, QueryPoint, QuerySettings, Visibility};
+use super::surfel::Surfel;
+use super::volume::{IrradianceCurve, Volume};
+use crate::light::lambert::reflected_radiance;
+use crate::math::color::luminance;
+use crate::math::octahedral::{direction_from_oct, texel_direction};
+
+/// Where the captures of all probes come from: memory, or traced again.
+pub trait Captures: Sync {
+    /// Calls `visit` on one probe's capture.
+    fn with<R>(&self, probe: usize, visit: impl FnOnce(&ProbeCapture) -> R) -> R;
+}
+
+impl Captures for Vec<ProbeCapture> {
+    fn with<R>(&self, probe: usize, visit: impl FnOnce(&ProbeCapture) -> R) -> R {
+        visit(&self[probe])
+    }
+}
+
+/// Irradiance of all interior texels, row by row, of all active probes in their order, W·m⁻²: what a sweep works on.
+pub type Field = Vec<Vec3>;
+
+/// The operator, with all that stays the same from sweep to sweep.
+pub struct Sweep<'a, C> {
+    pub captures: &'a C,
+    pub kernel: &'a Kernel,
+    pub query: &'a QuerySettings,
+    /// Whether emission takes part in the bounces (with emission sampled at the surfaces it must not: each path counts once).
+    pub gathers_emission: bool,
+}
+
+/// Of every probe's surfels: the corners of its cell that it sees, 0 where it must be looked up again. Empty where the
+/// method does not store visibility at surfaces.
+pub struct Masks(Vec<Vec<u8>>);
+
+impl<C: Captures> Sweep<'_, C> {
+    /// Whether the operator is linear (affine): sums and differences of fields may be put into it.
+    pub fn is_linear(&self, volume: &Volume) -> bool {
+        self.query.blend.is_linear() && volume.curve == IrradianceCurve::Linear
+    }
+
+    /// Neither surfels nor probes move, so once is enough.
+    pub fn masks(&self, volume: &Volume) -> Masks {
+        let of_probe = |p: usize| match volume.states[p] {
+            ProbeState::Active => self.masks_of(volume, p),
+            _ => Vec::new(),
+        };
+        Masks((0..volume.states.len()).into_par_iter().map(of_probe).collect())
+    }
+
+    fn masks_of(&self, volume: &Volume, p: usize) -> Vec<u8> {
+        let Some(surface) = &volume.surface_visibility else { return Vec::new() };
+        self.captures.with(p, |capture| {
+            capture.surfels.iter().map(|s| surface.look_up(&volume.grid, s.position, s.facing).mask).collect()
+        })
+    }
+
+    /// Irradiance of every probe from the outgoing radiance that the present irradiance gives; without `masks` from the
+    /// direct radiance alone. Also how many hits' radiance was not finite and left out.
+    pub fn apply(&self, volume: &Volume, masks: Option<&Masks>) -> (Field, u64) {
+        let of_probe = |p: usize| self.apply_to(volume, p, masks.map(|masks| masks.0[p].as_slice()));
+        let swept = self.gather(volume, of_probe);
+        let non_finite = swept.iter().map(|(_, lost)| lost).sum();
+        (swept.into_iter().flat_map(|(irradiance, _)| irradiance).map(Vec3::from).collect(), non_finite)
+    }
+
+    /// The operator's norm ‖T‖∞ per channel: the most that it makes of irradiance 1 everywhere, and so a bound of its
+    /// spectral radius. Weights of queries and filter are positive and sum to at most 1, so what remains is the filtered
+    /// albedo; queries that find no probe can only lower it.
+    pub fn norm(&self, volume: &Volume) -> Vec3 {
+        let largest = |p: usize| {
+            self.captures.with(p, |capture| {
+                let mut albedo = vec![Vec3A::ZERO; capture.texels];
+                let ones = Vec3::ONE;
+                capture.surfels.iter().for_each(|s| {
+                    albedo[s.texel as usize] += Vec3A::from(reflected_radiance(s.albedo(), ones));
+                });
+                let mut reflected = vec![Vec3A::ZERO; self.kernel.rows()];
+                self.kernel.irradiance(&albedo, &mut reflected);
+                reflected.into_iter().fold(Vec3A::ZERO, Vec3A::max)
+            })
+        };
+        self.gather(volume, largest).into_iter().fold(Vec3A::ZERO, Vec3A::max).into()
+    }
+
+    /// What a function gives of every active probe, in their order.
+    fn gather<R: Send>(&self, volume: &Volume, of_probe: impl Fn(usize) -> R + Sync + Send) -> Vec<R> {
+        let active = |p: &usize| volume.states[*p] == ProbeState::Active;
+        (0..volume.states.len()).into_par_iter().filter(active).map(of_probe).collect()
+    }
+
+    /// A sweep at one active probe, with the masks of its own surfels.
+    fn apply_to(&self, volume: &Volume, p: usize, masks: Option<&[u8]>) -> (Vec<Vec3A>, u64) {
+        let kernel = self.kernel;
+        let query = Query { volume, settings: self.query };
+        self.captures.with(p, |capture| {
+            let mut radiance =
+                if self.gathers_emission { capture.emitted_radiance() } else { vec![Vec3A::ZERO; capture.texels] };
+            let mut non_finite = 0;
+            for (i, surfel) in capture.surfels.iter().enumerate() {
+                let mut outgoing = surfel.direct_radiance;
+                if let Some(masks) = masks {
+                    let visibility = match masks.get(i) {
+                        None | Some(0) => Visibility::Stored,
+                        Some(&mask) => Visibility::Exact(mask),
+                    };
+                    let weights = query.weights(&self.query_point(surfel, volume.positions[p]), visibility);
+                    outgoing += reflected_radiance(surfel.albedo(), query.blend(&weights, surfel.oct()));
+                }
+                if outgoing.is_finite() {
+                    radiance[surfel.texel as usize] += Vec3A::from(outgoing);
+                } else {
+                    non_finite += 1;
+                }
+            }
+            let mut irradiance = vec![Vec3A::ZERO; kernel.rows()];
+            kernel.irradiance(&radiance, &mut irradiance);
+            (irradiance, non_finite)
+        })
+    }
+
+    /// Seconds that a sweep over these probes takes.
+    pub fn time(&self, volume: &Volume, probes: &[usize]) -> f64 {
+        let masks: Vec<Vec<u8>> = probes.par_iter().map(|&p| self.masks_of(volume, p)).collect();
+        let started = Instant::now();
+        let sweep = |(&p, masks): (&usize, &Vec<u8>)| self.apply_to(volume, p, Some(masks));
+        std::hint::black_box(probes.par_iter().zip(&masks).map(sweep).collect::<Vec<_>>());
+        started.elapsed().as_secs_f64()
+    }
+
+    /// How a probe asks for the light at a surfel. What the method does not look at is left zero.
+    fn query_point(&self, surfel: &Surfel, probe: Vec3) -> QueryPoint {
+        let normal = if self.query.weighs_by_normal() { direction_from_oct(surfel.oct()) } else { Vec3::ZERO };
+        let view = if self.query.view_bias != 0.0 { (probe - surfel.position).normalize_or_zero() } else { Vec3::ZERO };
+        QueryPoint { position: surfel.position, normal, facing: surfel.facing, view }
+    }
+
+    /// Adds the emitted light that probes see themselves: from their rays and from the emitters sampled at their centres.
+    /// Returns the mean luminance of the irradiance added, over all interior texels of active probes.
+    pub fn add_emission(&self, volume: &mut Volume) -> f64 {
+        let kernel = self.kernel;
+        let (resolution, border) = (volume.irradiance.resolution, volume.irradiance.border);
+        let interior = interior_texel(resolution, border);
+        let curve = volume.curve;
+        let n = volume.irradiance.texels_per_probe();
+        let states = &volume.states;
+        let add = |(p, out): (usize, &mut [Vec3A])| {
+            if states[p] != ProbeState::Active {
+                return None;
+            }
+            self.captures.with(p, |capture| {
+                let mut emitted = vec![Vec3A::ZERO; kernel.rows()];
+                let mut energy = 0.0;
+                kernel.irradiance(&capture.emitted_radiance(), &mut emitted);
+                for (o, value) in emitted.iter_mut().enumerate() {
+                    let at = interior(o);
+                    let normal = texel_direction(o % resolution, o / resolution, resolution);
+                    *value += Vec3A::from(capture.sampled_emitter_irradiance(normal));
+                    energy += f64::from(luminance((*value).into()));
+                    *value = curve.encode(*value + curve.decode(out[at]));
+                }
+                fill_with_border(&emitted, resolution, border, out);
+                Some(energy)
+            })
+        };
+        // Summed in order, on one thread: the same for any number of threads.
+        let energies: Vec<Option<f64>> = volume.irradiance.texels.par_chunks_mut(n).enumerate().map(add).collect();
+        let texels = energies.iter().flatten().count() * kernel.rows();
+        energies.iter().flatten().sum::<f64>() / texels.max(1) as f64
+    }
+}
+
+/// The irradiance that the volume's texels now stand for.
+pub fn field_of(volume: &Volume) -> Field {
+    let maps = &volume.irradiance;
+    let interior = interior_texel(maps.resolution, maps.border);
+    let of_probe = |p: usize| {
+        let map = maps.probe(p);
+        (0..maps.resolution * maps.resolution).map(move |o| Vec3::from(volume.curve.decode(map[interior(o)])))
+    };
+    active(volume).flat_map(of_probe).collect()
+}
+
+/// Stores a field in the volume; the inverse of [`field_of`] up to the rounding of its curve.
+pub fn store(volume: &mut Volume, field: &[Vec3]) {
+    let (resolution, border, curve) = (volume.irradiance.resolution, volume.irradiance.border, volume.curve);
+    let n = volume.irradiance.texels_per_probe();
+    let states = &volume.states;
+    let maps = volume.irradiance.texels.chunks_mut(n).zip(states).filter(|(_, s)| **s == ProbeState::Active);
+    let pairs: Vec<_> = maps.zip(field.chunks(resolution * resolution)).collect();
+    pairs.into_par_iter().for_each(|((map, _), values)| {
+        let encoded: Vec<Vec3A> = values.iter().map(|&e| curve.encode(e.into())).collect();
+        fill_with_border(&encoded, resolution, border, map);
+    });
+}
+
+fn active(volume: &Volume) -> impl Iterator<Item = usize> {
+    (0..volume.states.len()).filter(|&p| volume.states[p] == ProbeState::Active)
+}

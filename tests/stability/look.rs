@@ -3,7 +3,12 @@
 
 use std::path::{Path, PathBuf};
 
+use glam::Vec3;
 use lightprobe::image::LayeredImage;
+use lightprobe::probe::file;
+use lightprobe::probe::query::{Query, QueryPoint, QuerySettings, Visibility};
+use lightprobe::probe::surface_visibility::Facing;
+use lightprobe::scene::{self, LoadOptions, Scene};
 use serde_json::Value;
 
 use crate::common::{Folder, Gltf};
@@ -33,7 +38,16 @@ const UNASKED: [&str; 8] = [
 ];
 
 /// Ratios to the light seen: `null` where there is none.
-const OF_LIGHT: [&str; 6] = ["light", "dark", "fraction", "weight", "lookup_ns", "irradiance_indirect_mean"];
+const OF_LIGHT: [&str; 8] = [
+    "light",
+    "dark",
+    "fraction",
+    "weight",
+    "lookup_ns",
+    "irradiance_indirect_mean",
+    "error_bound",
+    "error_bound_relative",
+];
 
 /// Everything that could go wrong in a report, whatever the scene.
 fn check_report(report: &Value, lit: bool) {
@@ -131,6 +145,13 @@ impl Baked {
         Seen { report, pictures }
     }
 
+    /// Calls `ask` with the scene and the file's probes, ready for look-ups.
+    pub fn with_query<R>(&self, ask: impl FnOnce(&Scene, &Query) -> R) -> R {
+        let scene = scene::load(&self.scene, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+        let volume = file::read(&self.path).unwrap_or_else(|e| panic!("{e}")).volume(scene.origin_world);
+        ask(&scene, &Query { volume: &volume, settings: &QuerySettings::default() })
+    }
+
     /// Red irradiance of every interior texel of every active probe.
     pub fn texels(&self) -> Vec<f64> {
         let file = &self.file;
@@ -164,6 +185,12 @@ impl Seen {
         let image = LayeredImage::read_exr(&self.pictures.join(method).with_extension("exr"));
         image.unwrap_or_else(|e| panic!("{e}")).layer(layer).expect("the layer").to_vec()
     }
+}
+
+/// Red irradiance that a query gives at a point of a surface, relative to the scene's origin.
+pub fn irradiance_at(query: &Query, position: Vec3, normal: Vec3) -> f64 {
+    let point = QueryPoint { position, normal, facing: Facing::of(normal), view: normal };
+    f64::from(query.irradiance(&point, Visibility::Stored).x)
 }
 
 /// A `--look-at` with its places scaled.

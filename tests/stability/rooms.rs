@@ -80,8 +80,9 @@ pub struct Rooms {
     pub spacing_m: f64,
 }
 
-/// Between probes of [`Rooms`], metres: no wall lies on a border of voxels, where rounding, which differs from scale to
-/// scale, would decide which of two neighbours answers; the wall at x = 0 lies in the middle between two planes of probes.
+/// Between probes of [`Rooms`], metres: no wall of the shell lies on a border of voxels, where rounding, which differs from
+/// scale to scale, would decide which of two neighbours answers; the wall at x = 0 lies in the middle between two planes
+/// of probes.
 pub const SPACING_M: f64 = 0.97;
 
 /// Side of [`Lamp::Area`], metres.

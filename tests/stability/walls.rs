@@ -1,7 +1,9 @@
 //! Walls that are thin against everything: light on one side stays there, at every size of the scene.
 
-use super::case::{Bound, Case, Shared, shared};
-use super::look::{Baked, bake, scaled, worse};
+use glam::{DVec3, Vec3};
+
+use super::case::{Bound, Case, Found, Shared, shared};
+use super::look::{Baked, bake, irradiance_at, scaled, worse};
 use super::rooms::{Lamp, Rooms, SPACING_M, Triangles, Wall, inside_of, outside_of};
 use crate::common::Gltf;
 use crate::shapes::{add, diffuse, quad};
@@ -67,8 +69,41 @@ pub fn cases() -> Vec<Case> {
             }));
         }
     }
+    for (name, wall) in walls {
+        let checked = "floor lit from the other room, widths of a voxel";
+        cases
+            .push(Case::new("wall", format!("{name}, across voxels"), checked, Bound::AtMost(1.0), move || seam(wall)));
+    }
     cases.extend(boxes());
     cases
+}
+
+/// How far the light of the lit room reaches behind the foot of the wall, where floor on both sides of it lies in the same
+/// voxels and so shares one mask: a known limit of the method, which must not exceed the voxel.
+fn seam(wall: Wall) -> Found {
+    let rooms = Rooms { albedo: 0.7, wall, lamp: Lamp::Area(10.0), scale: 1.0, shift: 0.0, spacing_m: SPACING_M };
+    // Not in the middle about the wall, which so lies within voxels.
+    let bounds = "--set grid.bounds={\"min\":[-4.2,-0.1,-2.1],\"max\":[4.1,3.1,2.1]}";
+    let baked = bake(rooms.gltf(), &format!("{} {bounds}", rooms.words()));
+    let lit = baked.look("--camera lit").mean("visibility_on");
+    baked.with_query(|scene, query| {
+        let at = |x: f64, z: f64| {
+            let position = (DVec3::new(x, 0.0, z) - scene.origin_world).as_vec3();
+            irradiance_at(query, position, Vec3::Y) / lit
+        };
+        let voxel = SPACING_M / 8.0;
+        // Floor of the dark room, a sixty-fourth of a voxel apart, up to four voxels.
+        let behind = match wall {
+            Wall::Sealed(thickness) => f64::from(thickness) / 2.0,
+            _ => 0.0,
+        };
+        let steps = (0..256).map(|i| (f64::from(i) + 0.5) / 64.0);
+        let across = |v: f64| (-15..16).map(|k| at(behind + v * voxel, f64::from(k) / 8.0 + 0.01)).fold(0.0, worse);
+        let found: Vec<(f64, f64)> = steps.map(|v| (v, across(v))).collect();
+        let brightest = found.iter().map(|f| f.1).fold(0.0, worse);
+        let width = found.iter().filter(|f| f.1 > 1e-3).map(|f| f.0).fold(0.0, f64::max);
+        Found { figure: width, note: format!("brightest {brightest:.2} of the lit room") }
+    })
 }
 
 /// A closed box of 2 m with walls of 0.1 m on a floor of 8 m, a lamp inside or above it.

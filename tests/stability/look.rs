@@ -25,8 +25,11 @@ pub struct Baked {
     pub report: Value,
 }
 
-/// Keys that are `null` where nobody asked for the figure.
-const UNASKED: [&str; 8] = [
+/// Keys that are `null` where nobody asked for the figure, and the solver's that have no meaning where nothing bounces or
+/// the curve is not linear.
+const UNASKED: [&str; 10] = [
+    "error_bound",
+    "error_bound_relative",
     "raw_embree_rays_per_s",
     "saved_bytes",
     "saved_s",
@@ -38,16 +41,7 @@ const UNASKED: [&str; 8] = [
 ];
 
 /// Ratios to the light seen: `null` where there is none.
-const OF_LIGHT: [&str; 8] = [
-    "light",
-    "dark",
-    "fraction",
-    "weight",
-    "lookup_ns",
-    "irradiance_indirect_mean",
-    "error_bound",
-    "error_bound_relative",
-];
+const OF_LIGHT: [&str; 6] = ["light", "dark", "fraction", "weight", "lookup_ns", "irradiance_indirect_mean"];
 
 /// Everything that could go wrong in a report, whatever the scene.
 fn check_report(report: &Value, lit: bool) {

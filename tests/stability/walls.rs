@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::case::{Bound, Case, Found, Shared, shared};
+use super::case::{Bound, Case, Shared, shared};
 use super::look::{Baked, bake, irradiance_at, scaled, worse};
 use super::rooms::{Lamp, Rooms, SPACING_M, Triangles, Wall, inside_of, outside_of};
 use crate::common::Gltf;
@@ -70,22 +70,39 @@ pub fn cases() -> Vec<Case> {
         }
     }
     for (name, wall) in walls {
-        let checked = "floor lit from the other room, widths of a voxel";
-        cases
-            .push(Case::new("wall", format!("{name}, across voxels"), checked, Bound::AtMost(1.0), move || seam(wall)));
+        let name = format!("{name}, across voxels");
+        let seam: Shared<Seam> = shared(move || seam(wall));
+        let of = seam.clone();
+        let checked = "floor lit from the other room, voxels wide";
+        cases.push(Case::new("wall", &name, checked, Bound::AtMost(1.0), move || of.voxels));
+        // A known limit, see the README's: walls thinner than a voxel leave such a seam, which lights the dark room a little.
+        cases.push(Case::new("wall", &name, "dark room ÷ lit room, for that seam", Bound::AtMost(1e-2), move || {
+            seam.through
+        }));
     }
     cases.extend(boxes());
     cases
 }
 
+struct Seam {
+    /// Farthest floor behind the wall that has more than `WRONG` of the lit room's light, in voxels.
+    voxels: f64,
+    /// The dark room's light ÷ the lit one's.
+    through: f64,
+}
+
+/// More than what a wrongly lit strip scatters over the dark room, less than that strip has.
+const WRONG: f64 = 0.1;
+
 /// How far the light of the lit room reaches behind the foot of the wall, where floor on both sides of it lies in the same
 /// voxels and so shares one mask: a known limit of the method, which must not exceed the voxel.
-fn seam(wall: Wall) -> Found {
+fn seam(wall: Wall) -> Seam {
     let rooms = Rooms { albedo: 0.7, wall, lamp: Lamp::Area(10.0), scale: 1.0, shift: 0.0, spacing_m: SPACING_M };
     // Not in the middle about the wall, which so lies within voxels.
     let bounds = "--set grid.bounds={\"min\":[-4.2,-0.1,-2.1],\"max\":[4.1,3.1,2.1]}";
     let baked = bake(rooms.gltf(), &format!("{} {bounds}", rooms.words()));
     let lit = baked.look("--camera lit").mean("visibility_on");
+    let through = baked.look_dark("--camera dark").mean("visibility_on") / lit;
     baked.with_query(|scene, query| {
         let at = |x: f64, z: f64| {
             let position = (DVec3::new(x, 0.0, z) - scene.origin_world).as_vec3();
@@ -99,10 +116,7 @@ fn seam(wall: Wall) -> Found {
         };
         let steps = (0..256).map(|i| (f64::from(i) + 0.5) / 64.0);
         let across = |v: f64| (-15..16).map(|k| at(behind + v * voxel, f64::from(k) / 8.0 + 0.01)).fold(0.0, worse);
-        let found: Vec<(f64, f64)> = steps.map(|v| (v, across(v))).collect();
-        let brightest = found.iter().map(|f| f.1).fold(0.0, worse);
-        let width = found.iter().filter(|f| f.1 > 1e-3).map(|f| f.0).fold(0.0, f64::max);
-        Found { figure: width, note: format!("brightest {brightest:.2} of the lit room") }
+        Seam { voxels: steps.filter(|&v| across(v) > WRONG).fold(0.0, f64::max), through }
     })
 }
 

@@ -6,7 +6,8 @@ source "$(dirname -- "${BASH_SOURCE[0]}")/lib.sh"
 
 only_help "usage: scripts/test.sh
 
-Sets up (scripts/setup.sh), then runs cargo fmt --check, cargo clippy and cargo test. Exits 0 when all pass." "$@"
+Sets up (scripts/setup.sh), then runs cargo fmt --check, cargo clippy and cargo test, and compares the README's table of
+stability with the run. Exits 0 when all pass." "$@"
 
 bash scripts/setup.sh
 ensure_cargo
@@ -23,5 +24,8 @@ step() {
 
 step cargo fmt --check
 step cargo clippy --locked --release --all-targets -- -D warnings
+export STABILITY_JSON=$root/out/stability.json
+mkdir -p out
 step cargo test --locked --release
+step python3 scripts/readme/stability.py "$STABILITY_JSON" --check
 say 'all passed'

@@ -151,7 +151,7 @@ pub fn prepare<'w, 's>(
     }
     let mut surface = surface.map(|measured| measured.table);
     if let (Some(table), VisibilitySettings::Surface { .. }) = (&mut surface, config.query.visibility) {
-        table.far = need::far_probes(&world.tracer, &grid, &placement, table);
+        table.far = need::far_probes(world, &grid, &placement, table);
     }
     // Only where shading asks this very table does a probe that no surface sees weigh nothing.
     if let (Some(table), VisibilitySettings::Surface { .. }) = (&surface, config.query.visibility)
@@ -299,6 +299,7 @@ impl Prepared<'_, '_> {
         let (container, losses) = file::encode(&volume, encoding, &config.to_ron(), scene, &record);
         times.encode = started.elapsed().as_secs_f64();
         numerics.clamped = losses.clamped.clone();
+        numerics.underflowed = losses.underflowed.clone();
         numerics.variance_floor_hits = losses.variance_floor_hits;
         Ok(Baked { volume, container, losses, solution, plan, rays, times, numerics, surface_bytes })
     }

@@ -252,6 +252,9 @@ fn warn_about(report: &BakeReport, console: &Console) {
             numerics.albedo_clamped
         ));
     }
+    for (tensor, &count) in numerics.underflowed.iter().filter(|c| *c.1 > 0) {
+        console.say(format!("{count} value(s) of tensor '{tensor}' are too small for its format and stored as 0"));
+    }
     if !report.converged {
         console.warn("the bounces did not converge; raise solver.max_sweeps or solver.tolerance");
     }

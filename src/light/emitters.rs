@@ -15,7 +15,7 @@ use crate::math::sampling::{UNIFORM_SPHERE_DENSITY, cosine_hemisphere_density, t
 use crate::scene::environment::EnvironmentMap;
 use crate::scene::{Environment, Scene, TriangleIndex};
 use crate::trace::Hit;
-use crate::trace::offset::ray_offset;
+use crate::trace::offset::{end_offset, ray_offset};
 
 /// Points per side of the grid on which a textured triangle's mean emission is estimated.
 const POWER_GRID: usize = 4;
@@ -97,11 +97,11 @@ impl EmissiveTriangle {
             .unwrap_or_else(|| scene.emission(self.index, barycentric) * scene.opacity(self.index, barycentric))
     }
 
-    /// Where a shadow segment to a point of the triangle ends: short of it, on the side that faces the receiver, which
-    /// the sign of `cosine` names.
+    /// Where a shadow segment from `origin` to a point of the triangle ends: short of it, on the side that faces the
+    /// receiver, which the sign of `cosine` names.
     #[inline]
-    fn shadow_target(&self, point: Vec3, cosine: f32) -> Vec3 {
-        point + self.normal * self.ray_offset.copysign(cosine)
+    fn shadow_target(&self, origin: Vec3, point: Vec3, cosine: f32) -> Vec3 {
+        point + self.normal * self.ray_offset.max(end_offset(origin)).copysign(cosine)
     }
 }
 
@@ -244,7 +244,7 @@ impl Emitters {
         if !density.is_finite() {
             return None;
         }
-        let target = triangle.shadow_target(on_triangle, cosine);
+        let target = triangle.shadow_target(point, on_triangle, cosine);
         Some(LightSample { direction, target: Some(target), radiance: triangle.radiance(scene, barycentric), density })
     }
 
@@ -292,7 +292,7 @@ impl Emitters {
                 let radiance = triangle.radiance(scene, barycentric);
                 // Not finite where the receiver lies on the emitter.
                 (share.is_finite() && radiance != Vec3::ZERO).then(|| IrradianceSample {
-                    target: Ok(triangle.shadow_target(on_triangle, towards)),
+                    target: Ok(triangle.shadow_target(receiver.position, on_triangle, towards)),
                     irradiance: radiance * share,
                 })
             }

@@ -119,6 +119,8 @@ pub struct EncodedColors {
     pub scale: f32,
     /// Texels with a channel below 0 or above the format's maximum.
     pub clamped: u64,
+    /// Texels with a channel above 0 that is too small for the format, and stored as 0.
+    pub underflowed: u64,
 }
 
 /// Largest stored value is brought below this, which leaves packed floats 30 binary orders below it.
@@ -140,7 +142,7 @@ fn scale_for(largest: f32, format: ColorFormat) -> f32 {
 pub fn encode_colors(texels: &[Vec3], format: ColorFormat) -> EncodedColors {
     let largest = texels.iter().map(|t| t.max_element()).filter(|v| v.is_finite()).fold(0.0, f32::max);
     let scale = scale_for(largest, format);
-    let mut clamped = 0;
+    let (mut clamped, mut underflowed) = (0, 0);
     let mut bytes = Vec::with_capacity(texels.len() * format.bytes_per_texel());
     for texel in texels {
         let v = *texel / scale;
@@ -148,13 +150,24 @@ pub fn encode_colors(texels: &[Vec3], format: ColorFormat) -> EncodedColors {
         match format {
             ColorFormat::F32 => v.to_array().iter().for_each(|c| bytes.extend(c.to_le_bytes())),
             ColorFormat::F16 => {
-                let v = v.min(Vec3::splat(format.max()));
-                v.to_array().iter().for_each(|c| bytes.extend(f16::from_f32(*c).to_le_bytes()));
+                let codes = v.min(Vec3::splat(format.max())).to_array().map(f16::from_f32);
+                let stored = Vec3::from(codes.map(f16::to_f32));
+                underflowed += u64::from(is_lost(v, stored));
+                codes.iter().for_each(|c| bytes.extend(c.to_le_bytes()));
             }
-            ColorFormat::R11G11B10F => bytes.extend(pack_r11g11b10f(v).to_le_bytes()),
+            ColorFormat::R11G11B10F => {
+                let code = pack_r11g11b10f(v);
+                underflowed += u64::from(is_lost(v, unpack_r11g11b10f(code)));
+                bytes.extend(code.to_le_bytes());
+            }
         }
     }
-    EncodedColors { format, bytes, scale, clamped }
+    EncodedColors { format, bytes, scale, clamped, underflowed }
+}
+
+/// Whether any channel above 0 has become 0.
+fn is_lost(value: Vec3, stored: Vec3) -> bool {
+    (value.cmpgt(Vec3::ZERO) & stored.cmpeq(Vec3::ZERO)).any()
 }
 
 /// Inverse of [`encode_colors`] up to rounding; `bytes` must be whole texels.
@@ -213,8 +226,16 @@ mod tests {
     fn odd_values_are_clamped_and_counted() {
         let texels = [Vec3::new(-1.0, 0.0, 0.0), Vec3::new(f32::NAN, 1.0, 1.0), Vec3::ONE];
         let encoded = encode_colors(&texels, ColorFormat::R11G11B10F);
-        assert_eq!(encoded.clamped, 2);
+        assert_eq!((encoded.clamped, encoded.underflowed), (2, 0));
         assert_eq!(decode_colors(&encoded.bytes, encoded.format, encoded.scale)[2], Vec3::ONE);
+    }
+
+    #[test]
+    fn values_too_small_are_counted() {
+        let texels = [Vec3::splat(1e9), Vec3::splat(1e-9), Vec3::ZERO];
+        for (format, underflowed) in [(ColorFormat::F32, 0), (ColorFormat::F16, 1), (ColorFormat::R11G11B10F, 1)] {
+            assert_eq!(encode_colors(&texels, format).underflowed, underflowed, "{format:?}");
+        }
     }
 
     #[test]

@@ -52,6 +52,8 @@ pub struct SceneRecord {
 pub struct EncodingLosses {
     /// Per tensor: values outside the format's range.
     pub clamped: BTreeMap<String, u64>,
+    /// Per tensor: values above 0 that are too small for the format, and stored as 0.
+    pub underflowed: BTreeMap<String, u64>,
     /// Distance texels whose deviation rounds to zero, so that only the floor of the test is left.
     pub variance_floor_hits: u64,
 }
@@ -115,6 +117,7 @@ pub fn encode(
         shape.push(3);
     }
     losses.clamped.insert("irradiance".into(), colors.clamped);
+    losses.underflowed.insert("irradiance".into(), colors.underflowed);
     container.tensors.insert("irradiance".into(), tensor(dtype, &shape, colors.bytes));
 
     if let Some(maps) = &volume.distance {

@@ -11,7 +11,8 @@ use rayon::prelude::*;
 use super::grid::{Grid, ProbeIndex};
 use super::placement::{Placement, ProbeState, Settler};
 use super::surface_visibility::{Entry, SurfaceVisibility};
-use super::survey::Measured;
+use super::survey::{Measured, VOXEL_MARGIN};
+use crate::light::World;
 use crate::scene::Mesh;
 use crate::trace::{Ray, Tracer};
 
@@ -24,7 +25,7 @@ const FAR_RINGS: u32 = 3;
 /// Places tried for one probe, nearest first.
 const MAX_TRIES: usize = 12;
 
-/// A stretch of surface that sees no probe: a point just off it, and the direction that it faces.
+/// A stretch of surface that sees no probe: a point off it, with nothing in between, and the direction that it faces.
 #[derive(Debug, Clone, Copy)]
 struct Need {
     point: Vec3,
@@ -64,7 +65,11 @@ pub fn relocate(settler: &Settler, grid: &Grid, placement: &mut Placement, surve
         if !(0..8).any(|i| idle(grid.corner(grid.cell_base(cell), i).0 as usize)) {
             return Vec::new();
         }
-        table.entries(cell).filter(|entry| entry.mask == 0).map(|entry| need(grid, table, cell, &entry)).collect()
+        table
+            .entries(cell)
+            .filter(|entry| entry.mask == 0)
+            .map(|entry| need(settler.world, grid, table, cell, &entry))
+            .collect()
     };
     let needs: Vec<Vec<Need>> = (0..grid.cell_count()).into_par_iter().map(needs_of_cell).collect();
     let moves: Vec<(usize, Vec3)> = (0..grid.probe_count())
@@ -89,17 +94,30 @@ pub fn relocate(settler: &Settler, grid: &Grid, placement: &mut Placement, surve
     moves.len()
 }
 
-fn need(grid: &Grid, table: &SurfaceVisibility, cell: usize, entry: &Entry) -> Need {
+fn need(world: &World, grid: &Grid, table: &SurfaceVisibility, cell: usize, entry: &Entry) -> Need {
     let voxel_size = grid.spacing / table.voxels_per_cell as f32;
     let voxel = grid.cell_base(cell) * table.voxels_per_cell + entry.voxel;
-    let centre = (voxel.as_vec3() + 0.5) * voxel_size;
+    let centre = grid.origin + (voxel.as_vec3() + 0.5) * voxel_size;
     let normal = entry.facing;
-    // The surface lies somewhere in the voxel; the voxel's face on the open side is surely off it.
-    Need { point: grid.origin + centre + normal * (voxel_size * normal).length() * 0.5, normal }
+    let depth = (voxel_size * normal).length();
+    // The surface lies somewhere in the voxel; the voxel's face on the open side is off it, but another surface may lie in
+    // that very face or before it, as a ceiling close above a lamp does. From behind, the first hit is the surface.
+    let behind = centre - normal * depth * (0.5 + VOXEL_MARGIN);
+    let to_face = depth * (1.0 + VOXEL_MARGIN);
+    let open = match world.surface(Ray::new(behind, normal, 0)) {
+        Some(surface) if surface.hit.t < to_face => {
+            let off = surface.hit.t + surface.ray_offset;
+            let free = world.tracer.closest(Ray::new(behind + normal * off, normal, 0)).map_or(f32::INFINITY, |h| h.t);
+            (off + 0.5 * free).min(to_face)
+        }
+        // The line through the voxel's middle misses the surface.
+        _ => to_face,
+    };
+    Need { point: behind + normal * open, normal }
 }
 
 /// For every entry that sees none of its eight probes: the nearest active probe of the cells around that it sees.
-pub fn far_probes(tracer: &Tracer, grid: &Grid, placement: &Placement, table: &SurfaceVisibility) -> Vec<(u32, u32)> {
+pub fn far_probes(world: &World, grid: &Grid, placement: &Placement, table: &SurfaceVisibility) -> Vec<(u32, u32)> {
     let of_cell = |cell: usize| -> Vec<(u32, u32)> {
         let in_need: Vec<Entry> = table.entries(cell).filter(|entry| entry.mask == 0).collect();
         if in_need.is_empty() {
@@ -111,8 +129,8 @@ pub fn far_probes(tracer: &Tracer, grid: &Grid, placement: &Placement, table: &S
         in_need
             .iter()
             .filter_map(|entry| {
-                let need = need(grid, table, cell, entry);
-                let seen = rings.iter().find_map(|ring| nearest_visible(tracer, placement, ring, &need))?;
+                let need = need(world, grid, table, cell, entry);
+                let seen = rings.iter().find_map(|ring| nearest_visible(&world.tracer, placement, ring, &need))?;
                 Some((entry.index as u32, seen.0))
             })
             .collect()

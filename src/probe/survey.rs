@@ -57,7 +57,7 @@ pub struct Measured {
 
 /// Voxels are taken larger by this share on every side when surfaces are sorted into them, so that a surface on the
 /// border of two is known in both, on whichever side of it rounding puts the point that asks.
-const VOXEL_MARGIN: f32 = 0.03;
+pub(super) const VOXEL_MARGIN: f32 = 0.03;
 
 /// One side of a triangle in one voxel. Small, for there are millions and they are sorted.
 #[derive(Debug, Clone, Copy)]

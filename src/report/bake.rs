@@ -106,6 +106,8 @@ pub struct Numerics {
     pub non_finite: u64,
     /// Values outside the storage format's range, per tensor.
     pub clamped: BTreeMap<String, u64>,
+    /// Values above 0 that are too small for the storage format, and stored as 0, per tensor.
+    pub underflowed: BTreeMap<String, u64>,
     pub variance_floor_hits: u64,
     pub hits_outside_volume: u64,
     pub probes_inside_geometry: usize,

@@ -48,21 +48,23 @@ impl Method {
 
 /// Which of its eight probes a point sees, exactly: bit i for corner i, inactive probes never.
 ///
-/// Visible = the segment from the probe to P + ε·n_g is unblocked, n_g the geometric normal on the viewer's side.
+/// Visible = the segment from P + ε·n_g to the probe is unblocked, n_g the geometric normal on the viewer's side. From the
+/// surface, as in the survey: ε is the rounding there, and that of a ray which starts farther from the scene's origin may
+/// be larger.
 pub fn exact_masks(world: &World, query: &Query, points: &[ImagePoint]) -> Vec<u8> {
     let volume = query.volume;
     points
         .par_iter()
         .map(|point| {
-            let target = point.surface.ray_origin();
+            let origin = point.surface.ray_origin();
             let cell = volume.grid.cell(point.surface.position);
             (0..8).fold(0, |mask, i| {
                 let probe = volume.grid.corner(cell.base, i);
                 let position = volume.position(probe);
                 // A probe behind the surface is hidden by the surface itself.
                 let visible = volume.is_active(probe)
-                    && (position - target).dot(point.surface.geometric_normal) > 0.0
-                    && !world.tracer.occluded(Ray::segment(position, target, point.pixel));
+                    && (position - origin).dot(point.surface.geometric_normal) > 0.0
+                    && !world.tracer.occluded(Ray::segment(origin, position, point.pixel));
                 mask | u8::from(visible) << i
             })
         })

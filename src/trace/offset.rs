@@ -9,6 +9,12 @@ use glam::Vec3;
 /// 32 leaves a factor of four, and is 15 µm at 4 m.
 const OFFSET_ULPS: f32 = 32.0;
 
+/// Distance, metres, by which a ray from `origin` must end short of a surface that it must not hit, however near the scene's
+/// origin that surface lies: Embree moves every triangle by the ray's origin first, so that its rounding counts too.
+pub fn end_offset(origin: Vec3) -> f32 {
+    OFFSET_ULPS * f32::EPSILON * origin.abs().max_element()
+}
+
 /// Distance, metres, to start rays off a triangle with these corners. Scales with the scene: no absolute length in it.
 pub fn ray_offset(corners: &[Vec3; 3]) -> f32 {
     let largest = corners.iter().map(|c| c.abs().max_element()).fold(0.0, f32::max);

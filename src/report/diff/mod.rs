@@ -1,0 +1,3 @@
+//! Two results compared: figures, gates, verdict.
+
+pub mod gate;

@@ -93,8 +93,8 @@ pub struct ProbesReport {
     pub irradiance_candidate: f64,
     pub irradiance_change_percent: Option<f64>,
     pub irradiance_change_standard_error_percent: Option<f64>,
-    /// ÷ the base's mean.
-    pub irradiance_rms_percent: Option<f64>,
+    /// Root mean square of `irradiance_difference_relative`.
+    pub irradiance_rms_percent: f64,
     /// By `irradiance_difference_relative`, the largest first.
     pub worst: Vec<ProbeRow>,
     /// Of every compared probe, percent of the base's: for histograms.
@@ -134,6 +134,11 @@ fn matches(base: &Volume, candidate: &Volume) -> Vec<(ProbeIndex, ProbeIndex)> {
     }
     let all = (0..grid.probe_count() as u32).map(ProbeIndex);
     all.filter_map(|index| Some((index, *points.get(&grid.coordinate(index).as_ivec3())?))).collect()
+}
+
+fn mean_square(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let n = values.len().max(1) as f64;
+    values.map(|v| v * v).sum::<f64>() / n
 }
 
 fn directions() -> Vec<Vec3> {
@@ -201,12 +206,7 @@ fn compare_files(item: &str, base_file: &ProbeFile, candidate_file: &ProbeFile) 
         row.irradiance_difference_relative = if own > 0.0 { row.irradiance_difference / own } else { 0.0 };
     }
     let whole = change(&blocks(base, &rows));
-    let square = rows.iter().map(|r| r.irradiance_difference * r.irradiance_difference).sum::<f64>() / n;
-    let rms = match (square, mean_base) {
-        (0.0, _) => Some(0.0),
-        (_, 0.0) => None,
-        _ => Some(100.0 * square.sqrt() / mean_base),
-    };
+    let rms = 100.0 * mean_square(rows.iter().map(|r| r.irradiance_difference_relative)).sqrt();
     let changes_percent = rows.iter().filter(|r| r.irradiance_base > floor);
     let changes_percent =
         changes_percent.map(|r| (100.0 * (r.irradiance_candidate / r.irradiance_base - 1.0)) as f32).collect();
@@ -259,14 +259,7 @@ fn blocks(volume: &Volume, rows: &[ProbeRow]) -> Vec<Part> {
 }
 
 /// Findings about light.
-fn light(
-    item: &str,
-    volume: &Volume,
-    rows: &[ProbeRow],
-    means: [f64; 2],
-    rms: Option<f64>,
-    scale: f64,
-) -> Vec<Finding> {
+fn light(item: &str, volume: &Volume, rows: &[ProbeRow], means: [f64; 2], rms: f64, scale: f64) -> Vec<Finding> {
     let whole = change(&blocks(volume, rows));
     let mean = Finding {
         value: whole.map(|w| w.percent),
@@ -296,8 +289,8 @@ fn light(
         Finding::percentage(
             "probes.rms",
             item,
-            rms,
-            "Root mean square difference of irradiance over probes, directions and channels, as a share of the base's mean.",
+            Some(rms),
+            "Root mean square of the probes' differences, each relative to its own irradiance.",
         ),
         Finding::percentage(
             "probes.worst",
@@ -344,9 +337,10 @@ fn worst_region(volume: &Volume, rows: &[ProbeRow], scale: f64) -> Option<Region
             .collect();
         let place = rows.iter().map(|r| DVec3::from(r.position_m)).sum::<DVec3>() / rows.len() as f64;
         // Dark before and lit now is a change beyond all measure.
-        let found = change(&parts);
-        let (percent, error) = found.map_or((f64::MAX.sqrt(), 0.0), |f| (f.percent, f.standard_error.unwrap_or(0.0)));
-        Some(Region { percent, error, place })
+        let Some(found) = change(&parts) else { return Some(Region { percent: f64::MAX.sqrt(), error: 0.0, place }) };
+        // Too few lit probes to know their noise.
+        let error = if found.percent == 0.0 { 0.0 } else { found.standard_error? };
+        Some(Region { percent: found.percent, error, place })
     };
     // Against the error and a percent: where there is no noise the largest change counts.
     let weight = |r: &Region| r.percent.abs() / r.error.max(1.0);
@@ -356,8 +350,7 @@ fn worst_region(volume: &Volume, rows: &[ProbeRow], scale: f64) -> Option<Region
 fn distances(item: &str, volume: &Volume, rows: &[ProbeRow]) -> Vec<Finding> {
     let found: Option<Vec<f64>> = rows.iter().map(|r| r.distance_difference_m).collect();
     let Some(found) = found.filter(|found| !found.is_empty()) else { return Vec::new() };
-    let square = found.iter().map(|d| d * d).sum::<f64>() / found.len() as f64;
-    let percent = 100.0 * square.sqrt() / f64::from(volume.grid.spacing.max_element());
+    let percent = 100.0 * mean_square(found.into_iter()).sqrt() / f64::from(volume.grid.spacing.max_element());
     vec![Finding::percentage(
         "probes.distance",
         item,

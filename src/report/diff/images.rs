@@ -43,9 +43,8 @@ const SURFACE: [&str; 3] = ["albedo", "normal", "depth"];
 /// Layers that are light, in the order of their reports.
 const LIGHT: [&str; 2] = ["beauty", "irradiance_indirect"];
 
-/// Memory at the peak, per pixel: two sides of a layer and what a screen shows of them (30 B), FLIP's own pictures (its
-/// peak was 190 B per pixel, measured from 1 to 8 megapixels), the difference map and its picture (20 B).
-const PIXEL_BYTES: f64 = 280.0;
+/// Memory at the peak, per pixel, FLIP's own pictures included: 105 B were measured on 7680 × 4320, rounded up.
+const PIXEL_BYTES: f64 = 130.0;
 
 /// The pixel that differs most.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

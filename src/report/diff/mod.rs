@@ -274,9 +274,10 @@ fn compare_item(
             for pair in pictures(name, [a, b], b_report, request.mask) {
                 match (pair.base.is_file(), pair.candidate.is_file()) {
                     (true, true) => found.take_images(images::compare(&pair)?),
-                    (true, false) => found.missing.push(pair.item),
-                    (false, true) => found.added.push(pair.item),
-                    (false, false) => {}
+                    (true, false) if pair.judged => found.missing.push(pair.item),
+                    (false, true) if pair.judged => found.added.push(pair.item),
+                    // A baseline need not keep what does not decide.
+                    _ => {}
                 }
             }
             found.commands.extend([b_report, c_report].into_iter().filter_map(render_command));

@@ -359,41 +359,53 @@ fn distances(item: &str, volume: &Volume, rows: &[ProbeRow]) -> Vec<Finding> {
     )]
 }
 
-/// Findings about how light is stored, and what tells which of it arrives.
-fn structure(item: &str, base: &ProbeFile, candidate: &ProbeFile) -> Vec<Finding> {
-    let volumes = [base.volume_in_grid(), candidate.volume_in_grid()];
-    let steps = [base, candidate].map(|f| Some(step(f.irradiance_format)));
-    let borders = volumes.map(|v| Some(v.irradiance.border as f64));
-    let sides = volumes.map(|v| Some(v.irradiance.resolution as f64));
-    let tests = volumes.map(|v| {
-        let rank =
-            f64::from(u8::from(v.distance.is_some())) + 2.0 * f64::from(u8::from(v.surface_visibility.is_some()));
-        Some(rank)
-    });
-    // Less is worse.
-    let loss = |name, values: [Option<f64>; 2], explanation: &str| {
-        let found = Finding::difference(name, item, values, "", Direction::Increase, explanation);
-        Finding { value: found.value.map(|v| -v), ..found }
-    };
-    let bytes = [base, candidate].map(|f| Some(f.file_bytes as f64 / f.volume_in_grid().states.len() as f64));
-    let bits = volumes.map(|v| v.surface_visibility.as_ref().map(mean_bits));
-    let mut findings = vec![
+/// Less is worse.
+fn loss(name: &'static str, item: &str, values: [Option<f64>; 2], explanation: &str) -> Finding {
+    let found = Finding::difference(name, item, values, "", Direction::Increase, explanation);
+    Finding { value: found.value.map(|v| -v), ..found }
+}
+
+/// Findings about how irradiance is stored: format, border, texels along a side of the interior.
+pub fn storage(item: &str, sides: [(ColorFormat, usize, usize); 2]) -> Vec<Finding> {
+    let borders = sides.map(|(_, border, _)| Some(border as f64));
+    let resolutions = sides.map(|(_, _, resolution)| Some(resolution as f64));
+    vec![
         Finding::ratio(
             "probes.precision",
             item,
-            steps,
+            sides.map(|(format, _, _)| Some(step(format))),
             Direction::Increase,
             "Largest relative rounding error of stored irradiance: 2⁻²⁴ of f32, 2⁻¹¹ of f16, 2⁻⁶ of the blue of R11G11B10F.",
         ),
-        loss("probes.border", borders, "Border texels of the maps; without them octahedral maps show seams."),
-        loss("probes.resolution", sides, "Texels along a side of the irradiance maps."),
+        loss("probes.border", item, borders, "Border texels of the maps; without them octahedral maps show seams."),
+        loss("probes.resolution", item, resolutions, "Texels along a side of the irradiance maps."),
+    ]
+}
+
+/// Findings about how light is stored, and what tells which of it arrives.
+fn structure(item: &str, base: &ProbeFile, candidate: &ProbeFile) -> Vec<Finding> {
+    let files = [base, candidate];
+    let volumes = files.map(ProbeFile::volume_in_grid);
+    let tests = volumes.map(|v| {
+        let rank = |is_there: bool, rank: f64| if is_there { rank } else { 0.0 };
+        Some(rank(v.distance.is_some(), 1.0) + rank(v.surface_visibility.is_some(), 2.0))
+    });
+    let bytes = files.map(|f| Some(f.file_bytes as f64 / f.volume_in_grid().states.len() as f64));
+    let bits = volumes.map(|v| v.surface_visibility.as_ref().map(mean_bits));
+    let stored = files.map(|f| {
+        let maps = &f.volume_in_grid().irradiance;
+        (f.irradiance_format, maps.border, maps.resolution)
+    });
+    let mut findings = storage(item, stored);
+    findings.extend([
         loss(
             "probes.visibility",
+            item,
             tests,
             "What tells which probes a surface sees: 0 nothing, 1 distances, 2 surface visibility.",
         ),
         Finding::ratio("memory.file_bytes", item, bytes, Direction::Increase, "Bytes of the file per probe."),
-    ];
+    ]);
     if bits.iter().all(Option::is_some) {
         findings.push(Finding::ratio(
             "probes.visible",

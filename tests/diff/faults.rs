@@ -190,7 +190,7 @@ fn one_probe_of_five_hundred() {
         let probe = (200..512).find(|&p| states[p] == 0).unwrap();
         let bytes = &mut container.tensors.get_mut("irradiance").unwrap().bytes[probe * map..(probe + 1) * map];
         for number in bytes.as_chunks_mut::<4>().0 {
-            *number = (2.0 * f32::from_le_bytes(*number)).to_le_bytes();
+            *number = (4.0 * f32::from_le_bytes(*number)).to_le_bytes();
         }
         let path = folder.path().join(format!("{name}.corrupt.probes"));
         container.write(&path).unwrap();

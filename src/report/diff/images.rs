@@ -31,9 +31,9 @@ const CHANGED_SHARE: f64 = 0.5;
 /// The picture is divided into so many blocks along each side for the noise of its mean.
 const BLOCKS: u32 = 8;
 
-/// What the probes that many pixels share do to the noise of a picture's mean, beyond what its blocks show: the spread between
-/// seeds, over that which they show, was up to 1 where probes stood 1 m apart (two cameras of `two_rooms_open`, `cornell`), and
-/// up to 2 for a room of 2 m probes that is lit through one door.
+/// What the probes that many pixels share do to the noise of a picture's mean, beyond what its blocks show. Without it means of
+/// different seeds lay up to 2.3 of the standard errors apart where probes stood 1 m apart (`two_rooms_open`, `cornell`), but up
+/// to 6 in a room of 2 m probes that is lit through one door.
 const SHARED_PROBES: f64 = 2.0;
 
 /// By how much albedo may differ, and the components of a normal, and depth as a share of itself, before a pixel shows
@@ -277,7 +277,12 @@ fn compare_layer(pair: &Pair, layer: &str, is_named: bool, compared: &mut Compar
     if pair.judged {
         compared.findings.extend(findings(&item, &report, &sums, &blocks, &used, [&base, &candidate]));
     }
-    compared.maps.push(Some(difference_map(&item, &base, &candidate, &used)));
+    let unit = match layer {
+        _ if is_display => "",
+        "beauty" => "W·m⁻²·sr⁻¹",
+        _ => "W·m⁻²",
+    };
+    compared.maps.push(Some(difference_map((&item, unit), &base, &candidate, &used)));
     compared.reports.push(report);
     Ok(())
 }
@@ -451,7 +456,7 @@ fn surfaces(pair: &Pair) -> Result<Finding, DiffError> {
 }
 
 /// Candidate minus base, luminance.
-fn difference_map(title: &str, base: &Picture, candidate: &Picture, used: &[bool]) -> Picture8 {
+fn difference_map((title, unit): (&str, &str), base: &Picture, candidate: &Picture, used: &[bool]) -> Picture8 {
     let pairs = base.pixels.par_iter().zip(&candidate.pixels).zip(used);
     let values: Vec<f32> =
         pairs.map(|((b, c), used)| if *used { luminance(*c) - luminance(*b) } else { f32::NAN }).collect();
@@ -462,7 +467,7 @@ fn difference_map(title: &str, base: &Picture, candidate: &Picture, used: &[bool
         range: range_of(&values, Scale::Diverging),
         scale: Scale::Diverging,
         title: &format!("candidate minus base {title}"),
-        unit: "",
+        unit,
         missing: "not compared",
     }
     .draw()

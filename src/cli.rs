@@ -53,6 +53,12 @@ pub enum Command {
     /// All are compared with one path-traced reference, each with several seeds. Finished runs are kept in DIR/runs: a sweep
     /// that was interrupted, or has got more configurations or seeds, runs only what is missing.
     Sweep(SweepArgs),
+    /// Compare two results and judge by thresholds whether lighting, leaks, errors or costs got worse.
+    ///
+    /// Both sides are folders of `render`, reports of `bake`, probe files, sweeps, single images (EXR, HDR, PNG), or
+    /// folders of these, matched by name. Exits with 0 within thresholds, 1 beyond them, 2 when the sides cannot be
+    /// compared.
+    DiffReport(DiffArgs),
     /// Print what a probe file holds, and check its hashes.
     Inspect(InspectArgs),
 }
@@ -257,6 +263,32 @@ const MAX_SEEDS: i64 = 1000;
 pub enum EqualName {
     Positions,
     Bytes,
+}
+
+#[derive(Debug, Args)]
+pub struct DiffArgs {
+    /// What was accepted: a folder or a file.
+    #[arg(value_name = "BASE")]
+    pub base: PathBuf,
+    /// What is to be judged, of the same kind.
+    #[arg(value_name = "CANDIDATE")]
+    pub candidate: PathBuf,
+    /// Folder for diff.json, diff.md, junit.xml and the difference maps; created where missing.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Thresholds that go over the defaults, in the form of configs/diff.ron.
+    #[arg(long, value_name = "FILE.ron")]
+    pub thresholds: Option<PathBuf>,
+    /// Do not fail because the scene has changed; its light is judged all the same.
+    #[arg(long)]
+    pub allow_scene_change: bool,
+    /// Judge only the pixels of images that are white in this one, which must be of their size.
+    #[arg(long, value_name = "FILE.png")]
+    pub mask: Option<PathBuf>,
+    /// Put CANDIDATE in the place of BASE once they are compared, and exit with 0 whatever the verdict. A crash leaves
+    /// the old BASE or the new one; sides that cannot be compared leave it alone.
+    #[arg(long)]
+    pub update_baseline: bool,
 }
 
 #[derive(Debug, Args)]

@@ -5,9 +5,12 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use lightprobe::cli::Cli;
-use lightprobe::commands;
+use lightprobe::commands::{self, Outcome};
 
-/// Exit code of every error, as against 1 for "beyond thresholds".
+/// Exit code of a comparison that was made and is beyond its thresholds.
+const EXIT_BEYOND_THRESHOLDS: u8 = 1;
+
+/// Exit code of every error.
 const EXIT_ERROR: u8 = 2;
 
 fn main() -> ExitCode {
@@ -16,7 +19,8 @@ fn main() -> ExitCode {
         Err(message) => return print(&message),
     };
     match commands::run(cli) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::BeyondThresholds) => ExitCode::from(EXIT_BEYOND_THRESHOLDS),
         Err(error) => {
             eprintln!("error: {error:#}");
             ExitCode::from(EXIT_ERROR)

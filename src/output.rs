@@ -1,6 +1,7 @@
 //! Outputs appear whole or not at all: every writer of the project goes through [`write_atomically`].
 
 mod check;
+mod replace;
 
 use std::fs::{self, File, Permissions};
 use std::io::{self, BufWriter, ErrorKind, Write};
@@ -10,6 +11,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 pub use self::check::{Named, check_apart, check_folder, check_outputs, check_writable};
+pub use self::replace::{recover, replace};
 
 /// Mode asked for when a file is created; the kernel takes the umask's bits away.
 /// The temporary-file crate would otherwise make it private to its owner (0600).

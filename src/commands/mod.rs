@@ -2,6 +2,7 @@
 
 pub mod bake;
 mod camera;
+pub mod diff_report;
 pub mod inspect;
 pub mod reference;
 pub mod render;
@@ -56,16 +57,26 @@ impl Console {
     }
 }
 
+/// How a command ended that did its work.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    Done,
+    /// Of `diff-report`: some gate failed.
+    BeyondThresholds,
+}
+
 /// Runs the command that was typed.
-pub fn run(cli: Cli) -> Result<()> {
+pub fn run(cli: Cli) -> Result<Outcome> {
     let console = Console::new(&cli.output);
     match cli.command {
-        Command::Bake(args) => bake::run(&args, &console),
-        Command::Render(args) => render::run(&args, &console),
-        Command::Reference(args) => reference::run(&args, &console),
-        Command::Sweep(args) => sweep::run(&args, &console),
-        Command::Inspect(args) => inspect::run(&args, &console),
+        Command::Bake(args) => bake::run(&args, &console)?,
+        Command::Render(args) => render::run(&args, &console)?,
+        Command::Reference(args) => reference::run(&args, &console)?,
+        Command::Sweep(args) => sweep::run(&args, &console)?,
+        Command::DiffReport(args) => return diff_report::run(&args, &console),
+        Command::Inspect(args) => inspect::run(&args, &console)?,
     }
+    Ok(Outcome::Done)
 }
 
 /// Binds the work to so many threads; 0 means one per core.

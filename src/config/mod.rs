@@ -4,7 +4,7 @@
 //! `--config`, then `--set key=value` in the order given. [`Config::default`] is the preset `default`.
 
 mod check;
-mod messages;
+pub(crate) mod messages;
 mod overrides;
 pub mod presets;
 
@@ -118,7 +118,7 @@ pub fn from_ron<T: serde::de::DeserializeOwned>(text: &str, place: &str) -> Resu
 }
 
 /// RON in which optional values are written without `Some`.
-fn ron_options() -> ron::Options {
+pub(crate) fn ron_options() -> ron::Options {
     ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME)
 }
 

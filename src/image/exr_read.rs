@@ -50,15 +50,17 @@ impl LayeredImage {
     /// # Errors
     /// A file that cannot be opened, is damaged, is deep or subsampled, or has no colour at all.
     pub fn read_exr(path: &Path) -> Result<LayeredImage, ImageError> {
+        LayeredImage::read_exr_layers(path, |_| true)
+    }
+
+    /// The same with only those layers that are wanted, by name: pictures of many layers are large.
+    ///
+    /// # Errors
+    /// As those of [`LayeredImage::read_exr`].
+    pub fn read_exr_layers(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<LayeredImage, ImageError> {
         let file = ExrFile::open(path)?;
-        let colored = |(part, header)| Some((part, layers_of(header))).filter(|(_, layers)| !layers.is_empty());
-        let Some((part, mut wanted)) = file.headers().iter().enumerate().find_map(colored) else {
-            return Err(no_color(path, file.headers()));
-        };
-        // Beside named layers the plain channels are a second copy of one of them.
-        if wanted.len() > 1 {
-            wanted.remove(PLAIN);
-        }
+        let (part, mut wanted) = colored_part(path, &file)?;
+        wanted.retain(|name, _| is_wanted(if name == PLAIN { BEAUTY } else { name }));
         let size = file.headers()[part].layer_size;
         let mut image = LayeredImage::new(size.width() as u32, size.height() as u32);
         image.texts = texts_of(&file.headers()[part]);
@@ -72,6 +74,31 @@ impl LayeredImage {
         }
         Ok(image)
     }
+}
+
+/// Width, height, and the names of the layers that [`LayeredImage::read_exr`] would read, from the header alone.
+///
+/// # Errors
+/// As those of [`LayeredImage::read_exr`], pixels apart.
+pub fn read_exr_header(path: &Path) -> Result<(u32, u32, Vec<String>), ImageError> {
+    let file = ExrFile::open(path)?;
+    let (part, layers) = colored_part(path, &file)?;
+    let size = file.headers()[part].layer_size;
+    let named = |name: String| if name == PLAIN { BEAUTY.to_owned() } else { name };
+    Ok((size.width() as u32, size.height() as u32, layers.into_keys().map(named).collect()))
+}
+
+/// The first part that has any colour, and its layers.
+fn colored_part(path: &Path, file: &ExrFile<'_>) -> Result<(usize, BTreeMap<String, [usize; 3]>), ImageError> {
+    let colored = |(part, header)| Some((part, layers_of(header))).filter(|(_, layers)| !layers.is_empty());
+    let Some((part, mut layers)) = file.headers().iter().enumerate().find_map(colored) else {
+        return Err(no_color(path, file.headers()));
+    };
+    // Beside named layers the plain channels are a second copy of one of them.
+    if layers.len() > 1 {
+        layers.remove(PLAIN);
+    }
+    Ok((part, layers))
 }
 
 /// The layers of a part that have all three channels, by name: the channels' places in the file.

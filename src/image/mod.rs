@@ -1,5 +1,6 @@
 //! Pictures: linear ones in EXR, displayable ones in PNG, and the one way from the first to the second.
 
+mod any;
 mod error;
 mod exr_file;
 mod exr_read;
@@ -9,6 +10,7 @@ mod picture;
 mod png;
 mod tonemap;
 
+pub use any::{AnyImage, ImageHeader};
 pub use error::ImageError;
 pub use layered::LayeredImage;
 pub use picture::{Picture, Picture8};

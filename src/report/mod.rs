@@ -4,6 +4,7 @@ pub mod bake;
 pub mod baked;
 pub mod canvas;
 pub mod colormap;
+pub mod diff;
 pub mod error;
 pub mod font;
 pub mod format;

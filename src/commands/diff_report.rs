@@ -1,0 +1,153 @@
+//! `lightprobe diff-report`: two results → gates, verdict, files.
+
+use std::io::Write;
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+
+use super::{Console, Outcome, write_json};
+use crate::cli::DiffArgs;
+use crate::output::{self, Named, check_folder, check_outputs, create_folder, write_atomically};
+use crate::report::diff::images::Mask;
+use crate::report::diff::thresholds::Thresholds;
+use crate::report::diff::{
+    Compared, DiffReport, Request, compare, in_unit, junit, margin, markdown, outcome, shell_word,
+};
+use crate::report::format;
+use crate::report::table::{Column, Table};
+
+/// Files that the folder gets besides the difference maps.
+const JSON: &str = "diff.json";
+const MARKDOWN: &str = "diff.md";
+const JUNIT: &str = "junit.xml";
+
+/// Gates that pass and are printed all the same, the closest to their thresholds first.
+const CLOSEST: usize = 10;
+
+pub fn run(args: &DiffArgs, console: &Console) -> Result<Outcome> {
+    let thresholds = Thresholds::load(args.thresholds.as_deref())?;
+    if args.update_baseline {
+        output::recover(&args.base)?;
+    }
+    check_paths(args)?;
+    let mask = args.mask.as_deref().map(Mask::read).transpose()?;
+    let request = Request {
+        base: &args.base,
+        candidate: &args.candidate,
+        thresholds: &thresholds,
+        allow_scene_change: args.allow_scene_change,
+        mask: mask.as_ref(),
+        command: command_line(args),
+    };
+    let compared =
+        compare(&request, |item| console.say(format!("comparing {}", if item.is_empty() { "the two" } else { item })))?;
+    write(args, &compared)?;
+    print(args, console, &compared.report)?;
+    if args.update_baseline {
+        output::replace(&args.base, &args.candidate)?;
+        console.warn(format!("{} is now what {} was", args.base.display(), args.candidate.display()));
+        return Ok(Outcome::Done);
+    }
+    Ok(if compared.report.verdict.passed { Outcome::Done } else { Outcome::BeyondThresholds })
+}
+
+/// Refuses outputs that would be, or lie in, what is compared.
+fn check_paths(args: &DiffArgs) -> Result<()> {
+    check_folder(&args.output)?;
+    let real = |path: &Path| std::fs::canonicalize(path).ok();
+    let (base, candidate) = (real(&args.base), real(&args.candidate));
+    if args.update_baseline && base.is_some() && base == candidate {
+        bail!("--update-baseline: {} and {} are one; give two", args.base.display(), args.candidate.display());
+    }
+    // The folder need not be there yet: the nearest that is decides.
+    let output = args.output.ancestors().find_map(|p| real(if p == Path::new("") { Path::new(".") } else { p }));
+    for (name, side, path) in [("BASE", &base, &args.base), ("CANDIDATE", &candidate, &args.candidate)] {
+        if let (Some(output), Some(side)) = (&output, side)
+            && output.starts_with(side)
+        {
+            bail!("-o {}: it lies in {name}, {}; choose a folder beside it", args.output.display(), path.display());
+        }
+    }
+    if args.output.is_dir() {
+        let outputs: Vec<Named> = [JSON, MARKDOWN, JUNIT].map(|name| Named::new("-o", args.output.join(name))).into();
+        let mut inputs = vec![Named::new("BASE", &args.base), Named::new("CANDIDATE", &args.candidate)];
+        inputs.extend(args.thresholds.as_ref().map(|path| Named::new("the thresholds", path)));
+        inputs.extend(args.mask.as_ref().map(|path| Named::new("the mask", path)));
+        check_outputs(&outputs, &inputs)?;
+    }
+    Ok(())
+}
+
+/// What would ask for the same again; without --update-baseline, after which it would be another comparison.
+fn command_line(args: &DiffArgs) -> String {
+    let word = |path: &Path| shell_word(&path.display().to_string());
+    let mut line =
+        format!("lightprobe diff-report {} {} -o {}", word(&args.base), word(&args.candidate), word(&args.output));
+    if let Some(path) = &args.thresholds {
+        line += &format!(" --thresholds {}", word(path));
+    }
+    if args.allow_scene_change {
+        line += " --allow-scene-change";
+    }
+    if let Some(path) = &args.mask {
+        line += &format!(" --mask {}", word(path));
+    }
+    line
+}
+
+fn write(args: &DiffArgs, compared: &Compared) -> Result<()> {
+    let report = &compared.report;
+    // All texts are made before the first file is written.
+    let markdown = markdown::text(report);
+    let junit = junit::text(report).context("cannot write the gates as JUnit XML")?;
+    create_folder(&args.output)?;
+    for (name, picture) in &compared.pictures {
+        picture.write_png(&args.output.join(name))?;
+    }
+    write_atomically(&args.output.join(MARKDOWN), |file| file.write_all(markdown.as_bytes()))?;
+    write_atomically(&args.output.join(JUNIT), |file| file.write_all(junit.as_bytes()))?;
+    // Last: whoever waits for it finds the others there.
+    write_json(&args.output.join(JSON), report)
+}
+
+fn print(args: &DiffArgs, console: &Console, report: &DiffReport) -> Result<()> {
+    if console.json {
+        return console.print(&serde_json::to_string_pretty(report)?);
+    }
+    let mut table = Table::new(&[
+        ("", Column::Text),
+        ("gate", Column::Text),
+        ("of", Column::Text),
+        ("base", Column::Number),
+        ("candidate", Column::Number),
+        ("difference", Column::Number),
+        ("threshold", Column::Number),
+        ("margin", Column::Number),
+        ("from", Column::Text),
+    ]);
+    let failing = report.gates.iter().filter(|g| g.fails() || g.waived);
+    let passing = report.gates.iter().filter(|g| !g.fails() && !g.waived && g.is_judged());
+    let times = report.gates.iter().filter(|g| !g.is_judged());
+    let listed = failing.chain(passing.clone().take(CLOSEST)).chain(times);
+    for gate in listed {
+        let number = |value| format::or_undefined(value, |v| format::significant(v, 4));
+        table.push([
+            outcome(gate).to_owned(),
+            gate.name.clone(),
+            gate.item.clone(),
+            number(gate.base),
+            number(gate.candidate),
+            in_unit(gate.value, gate.unit),
+            in_unit(gate.threshold, gate.unit),
+            margin(gate),
+            gate.source.clone(),
+        ]);
+    }
+    console.print(&table.to_string())?;
+    let more = passing.count().saturating_sub(CLOSEST);
+    if more > 0 {
+        console.print(&format!("and {more} more gates that pass"))?;
+    }
+    console.print(&report.verdict.sentence)?;
+    console.print(&format!("wrote {}", args.output.display()))
+}

@@ -1,0 +1,475 @@
+//! Two pictures, pixel by pixel.
+//!
+//! `mae`, `rmse` and `psnr_db` are of the stored numbers as they stand, all channels pooled, peak 1: those of OpenImageIO's
+//! `idiff`. FLIP is of what a screen shows: PNG as they are, light at the base's exposure.
+
+use std::path::{Path, PathBuf};
+
+use glam::Vec3;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::DiffError;
+use super::gate::{Direction, Finding};
+use super::ratio::{Part, change};
+use crate::image::{AnyImage, ImageHeader, Picture, Picture8};
+use crate::math::color::{byte_from_unit, luminance};
+use crate::memory::{TooLittleMemory, available_bytes};
+use crate::report::colormap::Scale;
+use crate::report::error::flip::flip_map;
+use crate::report::heatmap::{Heatmap, range_of};
+
+/// ε of `relmse`, as a share of the base's squared mean: as in the errors of `render`.
+const RELATIVE_FLOOR: f64 = 1.0e-2;
+
+/// Light below this share of the mean does not count as a pixel's own.
+const DARK_SHARE: f64 = 0.05;
+
+/// A pixel has changed when it has by more than this share of its own light.
+const CHANGED_SHARE: f64 = 0.5;
+
+/// The picture is divided into so many blocks along each side for the noise of its mean.
+const BLOCKS: u32 = 8;
+
+/// What the probes that many pixels share do to the noise of a picture's mean, beyond what its blocks show. Without it means of
+/// different seeds lay up to 2.3 of the standard errors apart where probes stood 1 m apart (`two_rooms_open`, `cornell`), but up
+/// to 6 in a room of 2 m probes that is lit through one door.
+const SHARED_PROBES: f64 = 2.0;
+
+/// By how much albedo may differ, and the components of a normal, and depth as a share of itself, before a pixel shows
+/// another surface. Far above rounding, far below a percent of albedo.
+const SAME_ALBEDO: f32 = 1.0e-3;
+const SAME_NORMAL: f32 = 1.0e-2;
+const SAME_DEPTH: f32 = 1.0e-3;
+
+/// Layers that say which surface a pixel shows.
+const SURFACE: [&str; 3] = ["albedo", "normal", "depth"];
+
+/// Layers that are light, in the order of their reports.
+const LIGHT: [&str; 2] = ["beauty", "irradiance_indirect"];
+
+/// Memory at the peak, per pixel, FLIP's own pictures included: 105 B were measured on 7680 × 4320, rounded up.
+const PIXEL_BYTES: f64 = 130.0;
+
+/// The pixel that differs most.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct WorstPixel {
+    /// From the left.
+    pub x: u32,
+    /// From the top.
+    pub y: u32,
+    pub base: [f32; 3],
+    pub candidate: [f32; 3],
+}
+
+/// The comparison of two pictures, or of one layer of them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ImageReport {
+    pub item: String,
+    pub layer: String,
+    pub width: u32,
+    pub height: u32,
+    /// Whether its gates count; others are shown.
+    pub judged: bool,
+    /// Codes for a screen, and not light.
+    pub is_display: bool,
+    /// Of the base, for both.
+    pub exposure_ev: Option<f32>,
+    /// Pixels that are compared: finite on both sides and not masked.
+    pub pixels: usize,
+    pub non_finite_base: usize,
+    pub non_finite_candidate: usize,
+    /// Luminance.
+    pub mean_base: Option<f64>,
+    pub mean_candidate: Option<f64>,
+    pub mae: Option<f64>,
+    pub rmse: Option<f64>,
+    /// ε = 10⁻² · mean(base)².
+    pub relmse: Option<f64>,
+    /// Peak 1, as `idiff`; `null` where the pictures are equal.
+    pub psnr_db: Option<f64>,
+    pub flip: Option<FlipFigures>,
+    pub worst: Option<WorstPixel>,
+    pub path_base: PathBuf,
+    pub path_candidate: PathBuf,
+    /// Signed differences of luminance, as a picture in the report's folder.
+    pub difference_map: Option<String>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct FlipFigures {
+    pub mean: f64,
+    pub median: f64,
+    pub p95: f64,
+    pub p99: f64,
+    pub max: f64,
+}
+
+/// Two pictures to compare.
+#[derive(Debug, Clone)]
+pub struct Pair<'a> {
+    pub item: String,
+    pub base: PathBuf,
+    pub candidate: PathBuf,
+    /// Whether it decides.
+    pub judged: bool,
+    /// That of a report; else the base's own.
+    pub exposure_ev: Option<f32>,
+    /// White counts.
+    pub mask: Option<&'a Mask>,
+}
+
+/// Which pixels count.
+#[derive(Debug, Clone)]
+pub struct Mask {
+    pub path: PathBuf,
+    width: u32,
+    height: u32,
+    counts: Vec<bool>,
+}
+
+impl Mask {
+    /// Reads a picture whose white pixels count: those of at least half the code.
+    pub fn read(path: &Path) -> Result<Mask, DiffError> {
+        let image = AnyImage::read(path, |_| true)?.image;
+        let counts: Vec<bool> = image
+            .layers()
+            .next()
+            .map(|(_, pixels)| pixels.iter().map(|p| luminance(*p) >= 0.5).collect())
+            .unwrap_or_default();
+        if !counts.contains(&true) {
+            return Err(DiffError::Mask {
+                path: path.to_owned(),
+                what: "it has no white pixel; paint white what counts".into(),
+            });
+        }
+        Ok(Mask { path: path.to_owned(), width: image.width, height: image.height, counts })
+    }
+}
+
+/// What the comparison of two files found.
+#[derive(Debug, Default)]
+pub struct Compared {
+    pub reports: Vec<ImageReport>,
+    pub findings: Vec<Finding>,
+    /// In the order of `reports`.
+    pub maps: Vec<Option<Picture8>>,
+}
+
+/// Refuses pictures that cannot be compared, by their headers.
+pub fn check(pair: &Pair) -> Result<(), DiffError> {
+    let headers = [ImageHeader::read(&pair.base)?, ImageHeader::read(&pair.candidate)?];
+    let [base, candidate] = &headers;
+    let incomparable =
+        |what: String| DiffError::Incomparable { base: pair.base.clone(), candidate: pair.candidate.clone(), what };
+    if (base.width, base.height) != (candidate.width, candidate.height) {
+        return Err(incomparable(format!(
+            "{} × {} and {} × {} pixels; make both of one size",
+            base.width, base.height, candidate.width, candidate.height
+        )));
+    }
+    if base.is_display != candidate.is_display {
+        return Err(incomparable(
+            "one holds codes for a screen and the other light; compare EXR or HDR with its like".into(),
+        ));
+    }
+    if let Some(mask) = pair.mask.filter(|m| (m.width, m.height) != (base.width, base.height)) {
+        let what = format!(
+            "it has {} × {} pixels and {} has {} × {}; make them of one size",
+            mask.width,
+            mask.height,
+            pair.base.display(),
+            base.width,
+            base.height
+        );
+        return Err(DiffError::Mask { path: mask.path.clone(), what });
+    }
+    let needed = (f64::from(base.width) * f64::from(base.height) * PIXEL_BYTES) as u64;
+    match available_bytes() {
+        Some(available) if needed > available => Err(TooLittleMemory {
+            key: pair.base.display().to_string(),
+            what: "comparing it",
+            needed,
+            available,
+            remedy: "compare smaller pictures",
+        }
+        .into()),
+        _ => Ok(()),
+    }
+}
+
+/// Compares two files, layer by layer: one layer of both is in memory at a time.
+pub fn compare(pair: &Pair) -> Result<Compared, DiffError> {
+    let layers = ImageHeader::read(&pair.base)?.layers;
+    let others = ImageHeader::read(&pair.candidate)?.layers;
+    let mut compared = Compared::default();
+    let mut lights: Vec<&str> = LIGHT.into_iter().filter(|l| layers.iter().any(|n| n == l)).collect();
+    if lights.is_empty() {
+        lights = layers.iter().take(1).map(String::as_str).collect();
+    }
+    for layer in &lights {
+        if !others.iter().any(|o| o == layer) {
+            let what = format!("the second has no layer {layer}; render both with one version");
+            return Err(DiffError::Incomparable { base: pair.base.clone(), candidate: pair.candidate.clone(), what });
+        }
+        compare_layer(pair, layer, layers.len() > 1, &mut compared)?;
+    }
+    if SURFACE.iter().all(|s| layers.iter().any(|l| l == s) && others.iter().any(|l| l == s)) && pair.judged {
+        compared.findings.push(surfaces(pair)?);
+    }
+    Ok(compared)
+}
+
+/// One layer of one file.
+fn read(path: &Path, layer: &str) -> Result<(Picture, bool), DiffError> {
+    let AnyImage { image, is_display } = AnyImage::read(path, |name| name == layer)?;
+    let picture = image.picture(layer).unwrap_or_else(|| Picture::new(image.width, image.height));
+    Ok((picture, is_display))
+}
+
+/// Sums of a picture's differences.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    pixels: usize,
+    absolute: f64,
+    square: f64,
+    base: f64,
+    luminance: [f64; 2],
+    non_finite: [usize; 2],
+    worst: Option<(f64, usize)>,
+}
+
+fn compare_layer(pair: &Pair, layer: &str, is_named: bool, compared: &mut Compared) -> Result<(), DiffError> {
+    let (base, is_display) = read(&pair.base, layer)?;
+    let (candidate, _) = read(&pair.candidate, layer)?;
+    let counts = |i: usize| pair.mask.is_none_or(|mask| mask.counts[i]);
+    let finite = |i: usize| base.pixels[i].is_finite() && candidate.pixels[i].is_finite();
+    let used: Vec<bool> = (0..base.pixels.len()).map(|i| counts(i) && finite(i)).collect();
+    let mut sums = Sums::default();
+    let mut blocks = vec![Part::default(); BLOCKS.pow(2) as usize];
+    for (i, (b, c)) in base.pixels.iter().zip(&candidate.pixels).enumerate() {
+        if counts(i) {
+            sums.non_finite[0] += usize::from(!b.is_finite());
+            sums.non_finite[1] += usize::from(!c.is_finite());
+        }
+        if !used[i] {
+            continue;
+        }
+        let d = (*c - *b).as_dvec3();
+        sums.pixels += 1;
+        sums.absolute += d.abs().element_sum();
+        sums.square += d.length_squared();
+        sums.base += b.as_dvec3().element_sum();
+        let l = [f64::from(luminance(*b)), f64::from(luminance(*c))];
+        sums.luminance = [sums.luminance[0] + l[0], sums.luminance[1] + l[1]];
+        if sums.worst.is_none_or(|(worst, _)| d.length_squared() > worst) && d.length_squared() > 0.0 {
+            sums.worst = Some((d.length_squared(), i));
+        }
+        let (x, y) = (i as u32 % base.width, i as u32 / base.width);
+        let block = x * BLOCKS / base.width + BLOCKS * (y * BLOCKS / base.height);
+        blocks[block as usize].add(l[0], l[1]);
+    }
+    let exposure_ev = (!is_display).then(|| pair.exposure_ev.unwrap_or_else(|| base.auto_exposure_ev()));
+    // What is no light has no look: irradiance is compared in numbers alone.
+    let flip = if layer == LIGHT[1] { None } else { flip(&base, &candidate, exposure_ev, &used) };
+    let item = if is_named { join(&pair.item, layer) } else { pair.item.clone() };
+    let report = report(pair, layer, &item, &sums, flip, [&base, &candidate], exposure_ev);
+    if pair.judged {
+        compared.findings.extend(findings(&item, &report, &sums, &blocks, &used, [&base, &candidate]));
+    }
+    let unit = match layer {
+        _ if is_display => "",
+        "beauty" => "W·m⁻²·sr⁻¹",
+        _ => "W·m⁻²",
+    };
+    compared.maps.push(Some(difference_map((&item, unit), &base, &candidate, &used)));
+    compared.reports.push(report);
+    Ok(())
+}
+
+/// Name of a part of an item.
+pub fn join(item: &str, part: &str) -> String {
+    if item.is_empty() { part.to_owned() } else { format!("{item}/{part}") }
+}
+
+fn report(
+    pair: &Pair,
+    layer: &str,
+    item: &str,
+    sums: &Sums,
+    flip: Option<FlipFigures>,
+    [base, candidate]: [&Picture; 2],
+    exposure_ev: Option<f32>,
+) -> ImageReport {
+    let samples = 3.0 * sums.pixels as f64;
+    let any = |value: f64| (sums.pixels > 0).then_some(value);
+    let square = sums.square / samples;
+    let epsilon = RELATIVE_FLOOR * (sums.base / samples).powi(2);
+    ImageReport {
+        item: item.to_owned(),
+        layer: layer.to_owned(),
+        width: base.width,
+        height: base.height,
+        judged: pair.judged,
+        is_display: exposure_ev.is_none(),
+        exposure_ev,
+        pixels: sums.pixels,
+        non_finite_base: sums.non_finite[0],
+        non_finite_candidate: sums.non_finite[1],
+        mean_base: any(sums.luminance[0] / sums.pixels as f64),
+        mean_candidate: any(sums.luminance[1] / sums.pixels as f64),
+        mae: any(sums.absolute / samples),
+        rmse: any(square.sqrt()),
+        relmse: relmse(base, candidate, epsilon).filter(|_| sums.pixels > 0 && epsilon > 0.0),
+        psnr_db: any(-10.0 * square.log10()).filter(|_| square > 0.0),
+        flip,
+        worst: sums.worst.map(|(_, i)| WorstPixel {
+            x: i as u32 % base.width,
+            y: i as u32 / base.width,
+            base: base.pixels[i].to_array(),
+            candidate: candidate.pixels[i].to_array(),
+        }),
+        path_base: pair.base.clone(),
+        path_candidate: pair.candidate.clone(),
+        difference_map: None,
+    }
+}
+
+fn relmse(base: &Picture, candidate: &Picture, epsilon: f64) -> Option<f64> {
+    let terms = base.pixels.iter().zip(&candidate.pixels).filter(|(b, c)| b.is_finite() && c.is_finite());
+    let (mut sum, mut count) = (0.0, 0.0f64);
+    for (b, c) in terms {
+        for channel in 0..3 {
+            let (b, c) = (f64::from(b[channel]), f64::from(c[channel]));
+            sum += (c - b) * (c - b) / (b * b + epsilon);
+            count += 1.0;
+        }
+    }
+    (count > 0.0).then(|| sum / count)
+}
+
+fn flip(base: &Picture, candidate: &Picture, exposure_ev: Option<f32>, used: &[bool]) -> Option<FlipFigures> {
+    let shown = |picture: &Picture| match exposure_ev {
+        Some(ev) => picture.tonemapped(ev),
+        None => Picture8 {
+            width: picture.width,
+            height: picture.height,
+            pixels: picture.pixels.par_iter().map(|p| p.to_array().map(byte_from_unit)).collect(),
+        },
+    };
+    let map = flip_map(&shown(base), &shown(candidate));
+    let mut values: Vec<f32> = map.into_iter().zip(used).filter(|(_, used)| **used).map(|(v, _)| v).collect();
+    if values.is_empty() {
+        return None;
+    }
+    let mean = values.iter().map(|v| f64::from(*v)).sum::<f64>() / values.len() as f64;
+    values.par_sort_unstable_by(f32::total_cmp);
+    let at = |share: f64| f64::from(values[(share * (values.len() - 1) as f64).round() as usize]);
+    Some(FlipFigures { mean, median: at(0.5), p95: at(0.95), p99: at(0.99), max: at(1.0) })
+}
+
+fn findings(
+    item: &str,
+    report: &ImageReport,
+    sums: &Sums,
+    blocks: &[Part],
+    used: &[bool],
+    [base, candidate]: [&Picture; 2],
+) -> Vec<Finding> {
+    let whole = change(blocks).filter(|_| sums.pixels > 0);
+    let means = [report.mean_base, report.mean_candidate];
+    let mean = Finding {
+        value: whole.map(|w| w.percent),
+        ..Finding::ratio("image.mean", item, means, Direction::Both, "Mean luminance over all pixels.")
+    };
+    let base_mean = sums.base / (3.0 * sums.pixels as f64);
+    let rmse = match report.rmse {
+        Some(0.0) => Some(0.0),
+        Some(rmse) if base_mean > 0.0 => Some(100.0 * rmse / base_mean),
+        _ => None,
+    };
+    let floor = DARK_SHARE * base_mean.abs();
+    let is_changed = |i: &usize| {
+        let (b, c) = (base.pixels[*i].as_dvec3(), candidate.pixels[*i].as_dvec3());
+        (c - b).abs().element_sum() > CHANGED_SHARE * (0.5 * (b.abs() + c.abs()).element_sum() + 3.0 * floor)
+    };
+    let changed = (0..used.len()).filter(|i| used[*i]).filter(is_changed).count();
+    let share = (sums.pixels > 0).then(|| 100.0 * changed as f64 / sums.pixels as f64);
+    let non_finite = [sums.non_finite[0] as f64, sums.non_finite[1] as f64].map(Some);
+    let mut findings = vec![
+        Finding::difference(
+            "image.non_finite",
+            item,
+            non_finite,
+            "",
+            Direction::Increase,
+            "Pixels that are NaN or infinite.",
+        ),
+        mean.with_error(whole.and_then(|w| w.standard_error).map(|error| SHARED_PROBES * error)),
+        Finding::percentage(
+            "image.rmse",
+            item,
+            rmse,
+            "Root mean square difference of all channels, as a share of the base's mean.",
+        ),
+        Finding::percentage(
+            "image.changed",
+            item,
+            share,
+            "Share of pixels that changed by more than half of their own light.",
+        ),
+    ];
+    if let Some(flip) = report.flip {
+        let found = Finding::percentage("image.flip", item, Some(flip.mean), "Mean of FLIP: what an observer sees.");
+        findings.push(Finding { unit: "", scale: 1.0, ..found });
+        let found =
+            Finding::percentage("image.flip_p99", item, Some(flip.p99), "FLIP that a hundredth of the pixels exceed.");
+        findings.push(Finding { unit: "", scale: 1.0, ..found });
+    }
+    findings
+}
+
+/// Share of pixels that show another surface: no light and no noise in it.
+fn surfaces(pair: &Pair) -> Result<Finding, DiffError> {
+    let mut differs: Vec<bool> = Vec::new();
+    for layer in SURFACE {
+        let (base, _) = read(&pair.base, layer)?;
+        let (candidate, _) = read(&pair.candidate, layer)?;
+        differs.resize(base.pixels.len(), false);
+        let differ = |b: Vec3, c: Vec3| match layer {
+            "albedo" => (b - c).abs().max_element() > SAME_ALBEDO,
+            "normal" => (b - c).abs().max_element() > SAME_NORMAL,
+            _ => (b.x - c.x).abs() > SAME_DEPTH * b.x.abs(),
+        };
+        let pixels = base.pixels.iter().zip(&candidate.pixels);
+        differs.iter_mut().zip(pixels).for_each(|(d, (b, c))| *d |= differ(*b, *c));
+    }
+    let counts = |i: &usize| pair.mask.is_none_or(|mask| mask.counts[*i]);
+    let counted: Vec<usize> = (0..differs.len()).filter(counts).collect();
+    let share = counted.iter().filter(|i| differs[**i]).count() as f64 / counted.len().max(1) as f64;
+    Ok(Finding::percentage(
+        "image.surface",
+        &pair.item,
+        Some(100.0 * share),
+        "Share of pixels whose albedo, normal or depth differ: they show another surface.",
+    ))
+}
+
+/// Candidate minus base, luminance.
+fn difference_map((title, unit): (&str, &str), base: &Picture, candidate: &Picture, used: &[bool]) -> Picture8 {
+    let pairs = base.pixels.par_iter().zip(&candidate.pixels).zip(used);
+    let values: Vec<f32> =
+        pairs.map(|((b, c), used)| if *used { luminance(*c) - luminance(*b) } else { f32::NAN }).collect();
+    Heatmap {
+        values: &values,
+        width: base.width,
+        height: base.height,
+        range: range_of(&values, Scale::Diverging),
+        scale: Scale::Diverging,
+        title: &format!("candidate minus base {title}"),
+        unit,
+        missing: "not compared",
+    }
+    .draw()
+    .picture
+}

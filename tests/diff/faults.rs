@@ -1,0 +1,224 @@
+//! Faults put in on purpose: each must be found, by exit code 1 and the gate that is about it; the same without the fault
+//! must pass.
+
+use std::path::Path;
+use std::sync::OnceLock;
+
+use glam::Vec3;
+use lightprobe::probe::container::Container;
+use serde_json::{Value, json};
+
+use crate::common::Folder;
+use crate::made::{Made, diff, edited, failing, make, report, shift, with_pictures};
+use crate::program::scene;
+
+const ROOMS: &str = "--set grid.spacing_m=1";
+
+/// Made once: the rooms as they are.
+fn rooms() -> &'static (Folder, Made) {
+    static ROOMS_MADE: OnceLock<(Folder, Made)> = OnceLock::new();
+    ROOMS_MADE.get_or_init(|| {
+        let folder = Folder::new();
+        let made = make(&folder, "base", &scene("two_rooms_open"), ROOMS);
+        (folder, made)
+    })
+}
+
+/// The comparison fails and names this gate.
+fn caught(folder: &Folder, base: &Path, candidate: &Path, words: &[&str], gate: &str) {
+    let (code, found) = report(&diff(folder, base, candidate, words));
+    let failing = failing(&found);
+    assert!(failing.iter().any(|name| name == gate), "{gate} is not among {failing:?}");
+    assert_eq!(code, Some(1));
+    assert_eq!(found["verdict"]["passed"], false);
+    let markdown = std::fs::read_to_string(folder.path().join("out/diff.md")).unwrap();
+    let junit = std::fs::read_to_string(folder.path().join("out/junit.xml")).unwrap();
+    assert!(markdown.contains(&format!("FAIL `{gate}`")), "{markdown}");
+    assert!(junit.contains("<failure") && junit.contains(gate), "{junit}");
+    assert!(markdown.len() < 60_000);
+}
+
+fn passes(folder: &Folder, base: &Path, candidate: &Path, words: &[&str]) {
+    let (code, found) = report(&diff(folder, base, candidate, words));
+    assert_eq!((code, failing(&found)), (Some(0), vec![]), "{}", found["gates"]);
+}
+
+/// All three results of a bake, against those of another with this flag.
+fn bake_fault(words: &str, gates: [&str; 3]) {
+    let folder = Folder::new();
+    let (_, base) = rooms();
+    let fault = make(&folder, "fault", &scene("two_rooms_open"), &format!("{ROOMS} {words}"));
+    caught(&folder, &base.run, &fault.run, &[], gates[0]);
+    caught(&folder, &base.probes, &fault.probes, &[], gates[1]);
+    caught(&folder, &base.report, &fault.report, &[], gates[2]);
+}
+
+#[test]
+fn without_a_fault_everything_passes() {
+    let folder = Folder::new();
+    let (_, base) = rooms();
+    let again = make(&folder, "again", &scene("two_rooms_open"), ROOMS);
+    passes(&folder, &base.run, &again.run, &[]);
+    passes(&folder, &base.probes, &again.probes, &[]);
+    passes(&folder, &base.report, &again.report, &["--thresholds", &no_memory(&folder)]);
+}
+
+#[test]
+fn noise_between_seeds_passes() {
+    let folder = Folder::new();
+    let (_, base) = rooms();
+    for seed in 1..4 {
+        let other = make(&folder, &format!("s{seed}"), &scene("two_rooms_open"), &format!("{ROOMS} --seed {seed}"));
+        passes(&folder, &base.run, &other.run, &[]);
+        passes(&folder, &base.probes, &other.probes, &[]);
+        passes(&folder, &base.report, &other.report, &["--thresholds", &no_memory(&folder)]);
+    }
+}
+
+/// The peak of memory of tests that run side by side says nothing.
+fn no_memory(folder: &Folder) -> String {
+    folder.write("memory.ron", r#"(gates: {"memory.peak": ()})"#).to_str().unwrap().to_owned()
+}
+
+#[test]
+fn visibility_off() {
+    bake_fault("--set query.visibility=none", ["leak.fraction", "probes.visibility", "irradiance.energy"]);
+}
+
+#[test]
+fn border_dropped() {
+    bake_fault("--set encoding.border=0", ["probes.border"; 3]);
+}
+
+#[test]
+fn coarser_encoding() {
+    let folder = Folder::new();
+    let (_, coarse) = rooms();
+    let fine = make(&folder, "f16", &scene("two_rooms_open"), &format!("{ROOMS} --set encoding.irradiance=f16"));
+    caught(&folder, &fine.run, &coarse.run, &[], "probes.precision");
+    caught(&folder, &fine.probes, &coarse.probes, &[], "probes.precision");
+    caught(&folder, &fine.report, &coarse.report, &[], "probes.precision");
+    // The other way costs bytes.
+    caught(&folder, &coarse.probes, &fine.probes, &[], "memory.file_bytes");
+}
+
+#[test]
+fn one_bounce_less() {
+    let folder = Folder::new();
+    let bounces = |n: u32| {
+        let words = format!("{ROOMS} --set solver.max_bounces={n}");
+        make(&folder, &format!("b{n}"), &scene("two_rooms_open"), &words)
+    };
+    let (three, two) = (bounces(3), bounces(2));
+    caught(&folder, &three.run, &two.run, &[], "image.mean");
+    caught(&folder, &three.probes, &two.probes, &[], "irradiance.mean");
+    caught(&folder, &three.report, &two.report, &[], "irradiance.energy");
+}
+
+#[test]
+fn bias_doubled() {
+    let folder = Folder::new();
+    let biased = |bias: f32| {
+        let words =
+            format!("{ROOMS} --set query.visibility=moments(power:3,floor:0.05) --set query.normal_bias={bias}");
+        make(&folder, &format!("bias{bias}"), &scene("two_rooms_open"), &words)
+    };
+    let (once, twice) = (biased(0.05), biased(0.1));
+    caught(&folder, &once.run, &twice.run, &[], "image.mean");
+    caught(&folder, &once.probes, &twice.probes, &[], "irradiance.mean");
+}
+
+#[test]
+fn albedo_one_percent_up() {
+    let brighter = |json: &mut Value| {
+        for material in json["materials"].as_array_mut().unwrap() {
+            for channel in &mut material["pbrMetallicRoughness"]["baseColorFactor"].as_array_mut().unwrap()[..3] {
+                *channel = json!(channel.as_f64().unwrap() * 1.01);
+            }
+        }
+    };
+    let folder = Folder::new();
+    let (_, base) = rooms();
+    let changed = edited(&folder, &scene("two_rooms_open"), "albedo", brighter);
+    let fault = make(&folder, "fault", &changed, ROOMS);
+    scene_fault(&folder, base, &fault);
+}
+
+#[test]
+fn one_light_removed() {
+    let folder = Folder::new();
+    let with_bulb = |json: &mut Value| {
+        json["extensions"]["KHR_lights_punctual"] = json!({"lights": [{"type": "point", "intensity": 2.0}]});
+        json["extensionsUsed"].as_array_mut().unwrap().push(json!("KHR_lights_punctual"));
+        let bulb = json!({"translation": [2.0, 2.0, 0.0], "extensions": {"KHR_lights_punctual": {"light": 0}}});
+        let index = json["nodes"].as_array().unwrap().len();
+        json["nodes"].as_array_mut().unwrap().push(bulb);
+        json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(index));
+    };
+    let lit = make(&folder, "lit", &edited(&folder, &scene("two_rooms_open"), "bulb", with_bulb), ROOMS);
+    scene_fault(&folder, &lit, &rooms().1);
+}
+
+/// By the gate `scene`; and by the light alone where the scene may change.
+fn scene_fault(folder: &Folder, base: &Made, fault: &Made) {
+    for (a, b, light) in [
+        (&base.run, &fault.run, "image.mean"),
+        (&base.probes, &fault.probes, "irradiance.mean"),
+        (&base.report, &fault.report, "irradiance.energy"),
+    ] {
+        caught(folder, a, b, &[], "scene");
+        caught(folder, a, b, &["--allow-scene-change"], light);
+        let (_, found) = report(&diff(folder, a, b, &["--allow-scene-change"]));
+        assert!(!failing(&found).contains(&"scene".to_owned()));
+        let waived = found["gates"].as_array().unwrap().iter().find(|g| g["name"] == "scene").unwrap();
+        assert_eq!((&waived["waived"], &waived["source"]), (&json!(true), &json!("--allow-scene-change")));
+    }
+}
+
+#[test]
+fn one_probe_of_five_hundred() {
+    let folder = Folder::new();
+    // 512 probes, of which most are active.
+    let words = "--set grid.divisions=(8,8,8) --set encoding.irradiance=f32";
+    let base = make(&folder, "base", &scene("cornell"), words);
+    let other_seed = make(&folder, "other", &scene("cornell"), &format!("{words} --seed 5"));
+    passes(&folder, &base.probes, &other_seed.probes, &[]);
+    for (made, name) in [(&base, "same"), (&other_seed, "seed")] {
+        let mut container = Container::read(&made.probes).unwrap();
+        let map = container.tensors["irradiance"].bytes.len() / 512;
+        let states = container.tensors["state"].bytes.clone();
+        let probe = (200..512).find(|&p| states[p] == 0).unwrap();
+        let bytes = &mut container.tensors.get_mut("irradiance").unwrap().bytes[probe * map..(probe + 1) * map];
+        for number in bytes.as_chunks_mut::<4>().0 {
+            *number = (4.0 * f32::from_le_bytes(*number)).to_le_bytes();
+        }
+        let path = folder.path().join(format!("{name}.corrupt.probes"));
+        container.write(&path).unwrap();
+        caught(&folder, &base.probes, &path, &[], "probes.worst");
+        let (_, found) = report(&diff(&folder, &base.probes, &path, &[]));
+        assert_eq!(found["probes"][0]["worst"][0]["index"], probe, "{}", found["probes"][0]["worst"]);
+    }
+}
+
+#[test]
+fn a_picture_shifted_by_a_pixel() {
+    let folder = Folder::new();
+    let (_, base) = rooms();
+    let shifted = with_pictures(&folder, &base.run, "shifted", shift);
+    caught(&folder, &base.run, &shifted, &[], "image.surface");
+    let single = |run: &Path| run.join("visibility_on.exr");
+    caught(&folder, &single(&base.run), &single(&shifted), &[], "image.changed");
+}
+
+#[test]
+fn a_pixel_that_is_no_number() {
+    let folder = Folder::new();
+    let (_, base) = rooms();
+    let broken = with_pictures(&folder, &base.run, "nan", |width, height, pixels| {
+        assert_eq!(pixels.len(), (width * height) as usize);
+        pixels[100] = Vec3::new(0.5, f32::NAN, 0.5);
+    });
+    caught(&folder, &base.run, &broken, &[], "image.non_finite");
+    // Not a number on both sides is no change.
+    passes(&folder, &broken, &broken.join("."), &[]);
+}

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use ab_glyph::{Font, FontRef, PxScale};
 
 /// DejaVu Sans, cut down to what labels need: `assets/DejaVuSans-subset.md` says how, `assets/DejaVuSans-LICENSE.txt` on what terms.
-static BYTES: &[u8] = include_bytes!("assets/DejaVuSans-subset.ttf");
+pub(super) static BYTES: &[u8] = include_bytes!("assets/DejaVuSans-subset.ttf");
 
 /// The parsed font. It is part of the program, so a failure to parse is a bug and not a user's problem.
 pub static FONT: LazyLock<FontRef<'static>> =

@@ -1,0 +1,3 @@
+//! Comparison of two results.
+
+pub mod gate;

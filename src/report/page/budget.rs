@@ -21,9 +21,8 @@ pub fn fit(
     budget: usize,
     embed: impl Fn(usize, u32) -> io::Result<Embedded>,
 ) -> io::Result<Vec<Option<Embedded>>> {
-    let mut pairs: Vec<Option<Embedded>> =
-        (0..count).map(|i| embed(i, 1).map(Some)).collect::<io::Result<Vec<_>>>()?;
-    let total = |pairs: &[Option<Embedded>]| pairs.iter().flatten().map(Embedded::len).sum::<usize>();
+    let mut pairs: Vec<Option<Embedded>> = (0..count).map(|i| embed(i, 1).map(Some)).collect::<io::Result<Vec<_>>>()?;
+    let total = |pairs: &[Option<Embedded>]| pairs.iter().flatten().map(Embedded::size_bytes).sum::<usize>();
     let mut factor = 2;
     while factor <= COARSEST {
         for i in (0..count).rev() {

@@ -66,13 +66,9 @@ impl Embedded {
         Ok(Embedded { factor, size, base, candidate, is_candidate_relative, difference, scale })
     }
 
-    /// Of the page, in bytes.
-    pub fn len(&self) -> usize {
+    /// What it takes of the page, in bytes.
+    pub fn size_bytes(&self) -> usize {
         self.base.len() + self.candidate.len() + self.difference.len()
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 }
 
@@ -87,14 +83,16 @@ fn planes_of(pixels: &[Vec3], is_display_referred: bool) -> Vec<Vec<i16>> {
     let code = if is_display_referred { code_of_display } else { code_of_radiance };
     let channel = |c: usize| -> Vec<i16> { pixels.par_iter().map(|pixel| code(pixel[c])).collect() };
     let [red, green, blue] = [0, 1, 2].map(channel);
-    let minus_green = |plane: Vec<i16>| -> Vec<i16> { plane.iter().zip(&green).map(|(c, g)| c.wrapping_sub(*g)).collect() };
+    let minus_green =
+        |plane: Vec<i16>| -> Vec<i16> { plane.iter().zip(&green).map(|(c, g)| c.wrapping_sub(*g)).collect() };
     let (red, blue) = (minus_green(red), minus_green(blue));
     vec![green, red, blue]
 }
 
 /// Planes as differences from other ones.
 fn relative(planes: &[Vec<i16>], from: &[Vec<i16>]) -> Vec<Vec<i16>> {
-    let minus = |(plane, from): (&Vec<i16>, &Vec<i16>)| plane.iter().zip(from).map(|(a, b)| a.wrapping_sub(*b)).collect();
+    let minus =
+        |(plane, from): (&Vec<i16>, &Vec<i16>)| plane.iter().zip(from).map(|(a, b)| a.wrapping_sub(*b)).collect();
     planes.iter().zip(from).map(minus).collect()
 }
 

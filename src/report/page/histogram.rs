@@ -70,7 +70,9 @@ pub fn draw(values: &[f32], range: f64, unit: &str, what: &str) -> Result<Drawn,
         format::count(values.len() as u64),
         with_unit(range / BARS as f64, unit)
     );
-    for (number, words) in [(counts.beyond, "beyond the range, in the bars at its ends"), (counts.undefined, "undefined")] {
+    for (number, words) in
+        [(counts.beyond, "beyond the range, in the bars at its ends"), (counts.undefined, "undefined")]
+    {
         if number > 0 {
             summary += &format!("; {} {words}", format::count(number));
         }
@@ -136,7 +138,8 @@ fn svg(counts: &Counts, range: f64, unit: &str, what: &str) -> Result<String, Bo
             root.draw(&PathElement::new(vec![(x(value), bottom), (x(value), bottom + 4)], INK))?;
             text(&label, (x(value), bottom + 7), HPos::Center, VPos::Top)?;
         }
-        let axis = if unit.is_empty() { format!("difference → {what}") } else { format!("difference, {unit} → {what}") };
+        let axis =
+            if unit.is_empty() { format!("difference → {what}") } else { format!("difference, {unit} → {what}") };
         text(&axis, (LEFT + width / 2, SIZE.1 as i32 - 2), HPos::Center, VPos::Bottom)?;
         root.present()?;
     }

@@ -196,9 +196,11 @@ pub fn render(page: &Page<'_>) -> Result<String, PageError> {
     environment.add_template("macros.html", MACROS)?;
     environment.add_template("page.html", TEMPLATE)?;
     let template = environment.get_template("page.html")?;
-    let view = minijinja::Value::from_serialize(view::View::new(page)?);
+    let view = minijinja::Value::from(minijinja::value::Serde(view::View::new(page)?));
     let with_nonce = |nonce: &str| {
-        template.render(context! { page => view.clone(), style => STYLE, start => START, scripts => SCRIPTS, nonce => nonce })
+        template.render(
+            context! { page => view.clone(), style => STYLE, start => START, scripts => SCRIPTS, nonce => nonce },
+        )
     };
     // A name that is to pass for a script of ours would have to hold the hash of a page that holds that name.
     let nonce = blake3::hash(with_nonce(NO_NONCE)?.as_bytes()).to_hex();
@@ -279,7 +281,13 @@ mod tests {
     fn hostile_names_stay_names() {
         let harmless = page_of("x");
         let count = |page: &str, what: &str| page.matches(what).count();
-        for hostile in ["</script><script>boom()</script>", "\"><img src=x onerror=boom()>", "' onfocus='boom()", "<!--", "]]>{{ 7*7 }}"] {
+        for hostile in [
+            "</script><script>boom()</script>",
+            "\"><img src=x onerror=boom()>",
+            "' onfocus='boom()",
+            "<!--",
+            "]]>{{ 7*7 }}",
+        ] {
             let page = page_of(hostile);
             for markup in ["<script", "</script", "<img", "<!--", "<svg", "<style"] {
                 assert_eq!(count(&page, markup), count(&harmless, markup), "{markup} by {hostile}");

@@ -342,15 +342,23 @@ fn images(images: &[PageImage<'_>]) -> Result<Vec<ImageView>, PageError> {
         .zip(&prepared)
         .map(|(image, prepared)| view(image, prepared, still::width_for(images.len())))
         .collect::<Result<Vec<_>, _>>()?;
-    let stills = |view: &ImageView| view.base.len() + view.candidate.len() + view.difference.len() + 2 * view.legend.len();
+    let stills =
+        |view: &ImageView| view.base.len() + view.candidate.len() + view.difference.len() + 2 * view.legend.len();
     let room = budget::PICTURES_BYTES.saturating_sub(views.iter().map(stills).sum());
     let embedded = budget::fit(images.len(), room, |i, factor| {
         Embedded::new(&images[i], &prepared[i].difference, prepared[i].range, factor)
     })?;
     for (view, embedded) in views.iter_mut().zip(embedded) {
         view.embedded = embedded.map(|embedded| {
-            let Embedded { factor, size: Size { width, height }, base, candidate, is_candidate_relative, difference, scale } =
-                embedded;
+            let Embedded {
+                factor,
+                size: Size { width, height },
+                base,
+                candidate,
+                is_candidate_relative,
+                difference,
+                scale,
+            } = embedded;
             EmbeddedView { factor, width, height, scale, is_candidate_relative, base, candidate, difference }
         });
     }
@@ -384,7 +392,8 @@ fn view(image: &PageImage<'_>, prepared: &Prepared, width: u32) -> Result<ImageV
 }
 
 fn probes(probes: &ProbeComparison) -> Result<ProbesView, PageError> {
-    let length = |value: Option<f64>| format::or_undefined(value, |value| format!("{} m", format::significant(value, 3)));
+    let length =
+        |value: Option<f64>| format::or_undefined(value, |value| format!("{} m", format::significant(value, 3)));
     let row = |probe: &super::ProbeRow| ProbeView {
         index: probe.index,
         position: probe.position_m.map(|coordinate| format::significant(coordinate, DIGITS)),
@@ -395,7 +404,8 @@ fn probes(probes: &ProbeComparison) -> Result<ProbesView, PageError> {
         candidate_state: visible(&probe.candidate_state),
     };
     let histogram = |histogram: &super::Histogram| {
-        let range = f64::from(Colormap::new(Scale::Diverging, range_of(&histogram.values, Scale::Diverging)).range()[1]);
+        let range =
+            f64::from(Colormap::new(Scale::Diverging, range_of(&histogram.values, Scale::Diverging)).range()[1]);
         let drawn = histogram::draw(&histogram.values, range, &visible(&histogram.unit), &visible(&histogram.what))
             .map_err(PageError::Draw)?;
         Ok(TitledHistogram { title: visible(&histogram.title), drawn })

@@ -70,6 +70,7 @@ pub fn code_of_difference(value: f64, scale: f64) -> i16 {
 }
 
 /// The difference that a code stands for.
+#[cfg(test)]
 pub fn difference_of_code(code: i16, scale: f64) -> f64 {
     if code == NAN { f64::NAN } else { (f64::from(code) / PER_ASINH).sinh() * scale }
 }

@@ -57,6 +57,7 @@ fn predict(plane: &[i16], width: usize, i: usize) -> i16 {
 }
 
 /// The inverse of [`pack`]: `count` planes of `width · height` codes. `None` for any other text.
+#[cfg(test)]
 pub fn unpack(text: &str, count: usize, width: usize, height: usize) -> Option<Vec<Vec<i16>>> {
     let mut bytes = Vec::new();
     let mut decoder = flate2::write::ZlibDecoder::new(&mut bytes);

@@ -235,13 +235,27 @@ fn gate(gate: &Gate) -> GateView {
         base: plain(gate.base),
         candidate: plain(gate.candidate),
         value: Cell { text: with_unit(gate.value, gate.standard_error, gate.unit), raw: finite(gate.value) },
-        threshold: Cell { text: with_unit(gate.threshold, None, gate.unit), raw: finite(gate.threshold) },
+        threshold: Cell { text: threshold(gate), raw: finite(gate.threshold) },
         margin: cell(margin, format::percent),
         bar: 100.0 * margin.unwrap_or(0.0).abs().min(1.0),
         is_beyond: margin.is_some_and(|margin| margin < 0.0),
         source: visible(&gate.source),
         explanation: visible(&gate.explanation),
     }
+}
+
+/// A threshold as somebody wrote it: without the zeros that make figures as long as each other.
+fn threshold(gate: &Gate) -> String {
+    let text = with_unit(gate.threshold, None, gate.unit);
+    match text.split_once(' ') {
+        Some((number, unit)) => format!("{} {unit}", trimmed(number)),
+        None => trimmed(&text).to_owned(),
+    }
+}
+
+fn trimmed(number: &str) -> &str {
+    let is_fraction = number.contains('.') && !number.contains('e');
+    if is_fraction { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }
 
 fn finite(value: Option<f64>) -> Option<f64> {
@@ -416,4 +430,33 @@ fn probes(probes: &ProbeComparison) -> Result<ProbesView, PageError> {
         worst: probes.worst.iter().map(row).collect(),
         histograms: probes.histograms.iter().map(histogram).collect::<Result<_, PageError>>()?,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_have_their_unit() {
+        let cases = [
+            (Some(0.0123), "s", "12.3 ms"),
+            (Some(2048.0), "bytes", "2.00 KiB"),
+            (Some(-2048.0), "bytes", "-2.00 KiB"),
+            (Some(0.5), "%", "0.5000 %"),
+            (Some(f64::NAN), "", "–"),
+            (None, "m", "–"),
+        ];
+        for (value, unit, text) in cases {
+            assert_eq!(with_unit(value, None, unit), text);
+        }
+        assert_eq!(with_unit(Some(0.031), Some(0.0031), "m"), "0.0310 ± 0.0031 m");
+    }
+
+    #[test]
+    fn thresholds_are_short() {
+        for (long, short) in [("0.02000", "0.02"), ("20.00", "20"), ("100", "100"), ("1.00e-7", "1.00e-7"), ("–", "–")]
+        {
+            assert_eq!(trimmed(long), short);
+        }
+    }
 }

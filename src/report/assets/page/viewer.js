@@ -114,7 +114,7 @@ const viewers = (() => {
       }
       const bad = ([green, red, blue]) => {
         const found = [];
-        for (let i = 0; i < size; i++) if (![red[i], green[i], blue[i]].every(codec.isFinite)) found.push(i);
+        for (let i = 0; i < size; i++) if (!codec.isFinite(red[i]) || !codec.isFinite(green[i]) || !codec.isFinite(blue[i])) found.push(i);
         return found;
       };
       this.codes = { base, candidate, difference };

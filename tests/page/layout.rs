@@ -24,8 +24,10 @@ fn the_page_fits_telephones_screens_and_paper() {
             opened.shoot(&format!("fixture-{width}-{colors}"));
         }
     }
-    opened.resize(1280, 900);
+    // A4 at 96 px an inch: narrower than some screens, but no telephone.
+    opened.resize(794, 1123);
     opened.emulate("dark", "print");
+    assert_eq!(opened.text("getComputedStyle(document.querySelector('tbody.gate')).display"), "table-row-group");
     assert_eq!(opened.text("getComputedStyle(document.body).backgroundColor"), "rgb(255, 255, 255)");
     let is_shown =
         |selector: &str| opened.eval(&format!("document.querySelector('{selector}').checkVisibility()")) == true;

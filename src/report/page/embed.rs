@@ -17,9 +17,6 @@ use crate::math::color::luminance;
 /// Most pixels that a browser is asked to hold of one picture: 2560 × 1440 fits.
 const MOST_PIXELS: usize = 1 << 22;
 
-/// Codes of one picture.
-const CHANNELS: usize = 3;
-
 /// A pair of pictures, packed.
 #[derive(Debug, Clone)]
 pub struct Embedded {
@@ -112,6 +109,9 @@ pub(super) mod tests {
     use super::*;
     use crate::report::page::codes::{difference_of_code, radiance_of_code};
     use crate::report::page::pack::unpack;
+
+    /// Planes of one picture.
+    const CHANNELS: usize = 3;
 
     /// What the page's script makes of the texts: base and candidate, and the differences.
     pub fn decode(embedded: &Embedded) -> ([Vec<[i16; 3]>; 2], Vec<f64>) {

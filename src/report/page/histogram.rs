@@ -17,11 +17,11 @@ use crate::report::ticks::ticks;
 const BARS: usize = 61;
 
 /// Of the drawing, in its own units; the page scales it to its column.
-const SIZE: (u32, u32) = (560, 220);
+const SIZE: (u32, u32) = (440, 200);
 
 // What is not drawn over, in units of the drawing.
-const LEFT: i32 = 52;
-const RIGHT: i32 = 16;
+const LEFT: i32 = 68;
+const RIGHT: i32 = 20;
 const TOP: i32 = 12;
 const BOTTOM: i32 = 44;
 

@@ -5,6 +5,7 @@ mod error;
 mod exr_file;
 mod exr_read;
 mod exr_write;
+mod jpeg;
 mod layered;
 mod picture;
 mod png;

@@ -12,6 +12,7 @@ pub mod header;
 pub mod heatmap;
 pub mod leak;
 pub mod legend;
+pub mod page;
 pub mod plot;
 pub mod probe_key;
 pub mod reference;

@@ -1,0 +1,218 @@
+//! A pair of pictures as text in the page: radiance within 1 % a channel, differences as fine as the heat map shows them.
+//!
+//! Planes of a picture's codes: G, R − G, B − G (the logarithm of chroma is the same over a lit surface); the candidate's may be
+//! stored as differences from the base's, where that is smaller.
+
+use std::io;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::PageImage;
+use super::codes::{code_of_difference, code_of_display, code_of_radiance, difference_scale};
+use super::pack::pack;
+use super::shrink::{Size, mean_of_blocks, peak_of_blocks};
+use crate::math::color::luminance;
+
+/// Most pixels that a browser is asked to hold of one picture: 2560 × 1440 fits.
+const MOST_PIXELS: usize = 1 << 22;
+
+/// A pair of pictures, packed.
+#[derive(Debug, Clone)]
+pub struct Embedded {
+    /// How many pixels, along each side, became one.
+    pub factor: u32,
+    pub size: Size,
+    pub base: String,
+    pub candidate: String,
+    /// Whether `candidate` holds differences from `base`.
+    pub is_candidate_relative: bool,
+    pub difference: String,
+    /// [`difference_scale`] of the heat map's range.
+    pub scale: f64,
+}
+
+impl Embedded {
+    /// Packs a pair with blocks of `factor` × `factor` pixels as one, or larger ones where the picture is too large for a browser.
+    ///
+    /// # Errors
+    /// Those of [`pack`].
+    pub fn new(image: &PageImage<'_>, difference: &[f32], range: f32, factor: u32) -> io::Result<Embedded> {
+        let whole = image.size();
+        let factor = factor.max(least_factor(whole));
+        let size = whole.shrunk(factor);
+        let scale = difference_scale(f64::from(range));
+        let planes = |pixels: &[Vec3]| planes_of(&mean_of_blocks(pixels, whole, factor), image.is_display_referred);
+        let [base, candidate] = [planes(&image.base), planes(&image.candidate)];
+        let difference = || {
+            let values = peak_of_blocks(difference, whole, factor);
+            vec![values.into_par_iter().map(|value| code_of_difference(f64::from(value), scale)).collect()]
+        };
+        let jobs: [Box<dyn Fn() -> Vec<Vec<i16>> + Sync>; 4] = [
+            Box::new(|| base.clone()),
+            Box::new(|| candidate.clone()),
+            Box::new(|| relative(&candidate, &base)),
+            Box::new(difference),
+        ];
+        let packed: io::Result<Vec<String>> =
+            jobs.into_par_iter().map(|planes| pack(&planes(), size.width as usize)).collect();
+        let [base, absolute, relative, difference] =
+            <[String; 4]>::try_from(packed?).map_err(|_| io::Error::other("four jobs gave another number of texts"))?;
+        let is_candidate_relative = relative.len() < absolute.len();
+        let candidate = if is_candidate_relative { relative } else { absolute };
+        Ok(Embedded { factor, size, base, candidate, is_candidate_relative, difference, scale })
+    }
+
+    /// What it takes of the page, in bytes.
+    pub fn size_bytes(&self) -> usize {
+        self.base.len() + self.candidate.len() + self.difference.len()
+    }
+}
+
+/// The signed difference that heat map and histogram show: luminance of candidate − base.
+pub fn differences(image: &PageImage<'_>) -> Vec<f32> {
+    let difference = |(base, candidate): (&Vec3, &Vec3)| luminance(*candidate - *base);
+    image.base.par_iter().zip(&image.candidate[..]).map(difference).collect()
+}
+
+/// The codes of a picture in three planes.
+fn planes_of(pixels: &[Vec3], is_display_referred: bool) -> Vec<Vec<i16>> {
+    let code = if is_display_referred { code_of_display } else { code_of_radiance };
+    let channel = |c: usize| -> Vec<i16> { pixels.par_iter().map(|pixel| code(pixel[c])).collect() };
+    let [red, green, blue] = [0, 1, 2].map(channel);
+    let minus_green =
+        |plane: Vec<i16>| -> Vec<i16> { plane.iter().zip(&green).map(|(c, g)| c.wrapping_sub(*g)).collect() };
+    let (red, blue) = (minus_green(red), minus_green(blue));
+    vec![green, red, blue]
+}
+
+/// Planes as differences from other ones.
+fn relative(planes: &[Vec<i16>], from: &[Vec<i16>]) -> Vec<Vec<i16>> {
+    let minus =
+        |(plane, from): (&Vec<i16>, &Vec<i16>)| plane.iter().zip(from).map(|(a, b)| a.wrapping_sub(*b)).collect();
+    planes.iter().zip(from).map(minus).collect()
+}
+
+/// The smallest power of two that leaves few enough pixels.
+fn least_factor(size: Size) -> u32 {
+    let mut factor = 1;
+    while size.shrunk(factor).pixels() > MOST_PIXELS {
+        factor *= 2;
+    }
+    factor
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use std::borrow::Cow;
+
+    use super::*;
+    use crate::report::page::codes::{difference_of_code, radiance_of_code};
+    use crate::report::page::pack::unpack;
+
+    /// Planes of one picture.
+    const CHANNELS: usize = 3;
+
+    /// What the page's script makes of the texts: base and candidate, and the differences.
+    pub fn decode(embedded: &Embedded) -> ([Vec<[i16; 3]>; 2], Vec<f64>) {
+        let Size { width, height } = embedded.size;
+        let open = |text: &str, count| unpack(text, count, width as usize, height as usize).unwrap();
+        let base = open(&embedded.base, CHANNELS);
+        let mut candidate = open(&embedded.candidate, CHANNELS);
+        if embedded.is_candidate_relative {
+            for (plane, base) in candidate.iter_mut().zip(&base) {
+                plane.iter_mut().zip(base).for_each(|(code, base)| *code = code.wrapping_add(*base));
+            }
+        }
+        let pixels = |planes: &[Vec<i16>]| {
+            let pixel = |i: usize| {
+                let green = planes[0][i];
+                [planes[1][i].wrapping_add(green), green, planes[2][i].wrapping_add(green)]
+            };
+            (0..embedded.size.pixels()).map(pixel).collect::<Vec<_>>()
+        };
+        let difference =
+            open(&embedded.difference, 1)[0].iter().map(|&code| difference_of_code(code, embedded.scale)).collect();
+        ([pixels(&base), pixels(&candidate)], difference)
+    }
+
+    /// A pair with many magnitudes, zeros, negatives and what is no light.
+    pub fn pair(width: u32, height: u32) -> PageImage<'static> {
+        let side = |turn: f32| -> Vec<Vec3> {
+            let pixel = |i: u32| {
+                let (x, y) = ((i % width) as f32, (i / width) as f32);
+                let magnitude = ((0.31 * x + turn).sin() * 9.0 - 0.2 * y).exp2();
+                Vec3::new(magnitude, 0.7 * magnitude + 0.01, if i % 11 == 0 { 0.0 } else { 0.2 * magnitude })
+            };
+            (0..width * height).map(pixel).collect()
+        };
+        let (base, mut candidate) = (side(0.0), side(0.05));
+        candidate[5] = Vec3::new(f32::NAN, f32::INFINITY, -3.0);
+        PageImage {
+            name: "lit/visibility_on".to_owned(),
+            quantity: "radiance".to_owned(),
+            unit: "W·m⁻²·sr⁻¹".to_owned(),
+            width,
+            height,
+            base: Cow::Owned(base),
+            candidate: Cow::Owned(candidate),
+            exposure_ev: 0.5,
+            is_display_referred: false,
+            figures: Vec::new(),
+            worst_pixel: Some([3, 4]),
+        }
+    }
+
+    #[test]
+    fn every_channel_comes_back_within_a_percent() {
+        let image = pair(37, 23);
+        let difference = differences(&image);
+        let embedded = Embedded::new(&image, &difference, 2.0, 1).unwrap();
+        let ([base, candidate], shown) = decode(&embedded);
+        for (pixels, codes) in [(&image.base, base), (&image.candidate, candidate)] {
+            for (pixel, codes) in pixels.iter().zip(codes) {
+                for c in 0..3 {
+                    let (value, back) = (f64::from(pixel[c]), radiance_of_code(codes[c]));
+                    let same = value == back || (value.is_nan() && back.is_nan());
+                    assert!(same || (back - value).abs() <= 0.01 * value.abs(), "{value} gave {back}");
+                }
+            }
+        }
+        for (value, back) in difference.iter().map(|&d| f64::from(d)).zip(shown) {
+            if value.is_finite() {
+                assert!((back - value).abs() <= 2.0 / 512.0 + 0.01 * value.abs(), "{value} gave {back}");
+            } else {
+                assert!(back.is_nan());
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_equal_costs_next_to_nothing() {
+        let mut image = pair(64, 64);
+        image.candidate = image.base.clone();
+        let embedded = Embedded::new(&image, &differences(&image), 1.0, 1).unwrap();
+        assert!(embedded.is_candidate_relative);
+        assert!(embedded.candidate.len() + embedded.difference.len() < embedded.base.len() / 20);
+    }
+
+    #[test]
+    fn display_values_come_back_exactly() {
+        let mut image = pair(8, 8);
+        image.is_display_referred = true;
+        image.base = (0..64).map(|i| Vec3::splat(i as f32 * 4.0 / 255.0)).collect();
+        image.candidate = image.base.clone();
+        let ([base, _], _) = decode(&Embedded::new(&image, &differences(&image), 1.0, 1).unwrap());
+        assert!(base.iter().enumerate().all(|(i, code)| *code == [i as i16 * 4; 3]));
+    }
+
+    #[test]
+    fn too_large_a_picture_is_shrunk() {
+        assert_eq!(least_factor(Size { width: 1920, height: 1080 }), 1);
+        assert_eq!(least_factor(Size { width: 7680, height: 4320 }), 4);
+        let image = pair(9, 7);
+        let embedded = Embedded::new(&image, &differences(&image), 1.0, 2).unwrap();
+        assert_eq!((embedded.factor, embedded.size), (2, Size { width: 5, height: 4 }));
+        assert_eq!(decode(&embedded).1.len(), 20);
+    }
+}

@@ -1,0 +1,349 @@
+//! The page of a comparison: one HTML file that holds its pictures, plots, style and script, and asks nothing of any network.
+//!
+//! A policy in its head (Content Security Policy, W3C, level 3) forbids every load but those of its own data, and every script but
+//! its own, which it knows by a number that no name from outside can foresee.
+
+mod budget;
+mod codes;
+mod embed;
+mod histogram;
+mod lines;
+mod pack;
+mod shrink;
+mod still;
+mod view;
+mod visible;
+
+use std::borrow::Cow;
+use std::io;
+
+use glam::Vec3;
+use minijinja::{Environment, context};
+use thiserror::Error;
+
+use super::diff::gate::Gate;
+use shrink::Size;
+
+pub use codes::{code_of_radiance, radiance_of_code};
+
+/// What the page shows.
+#[derive(Debug, Clone)]
+pub struct Page<'a> {
+    pub title: String,
+    /// Base, candidate.
+    pub sides: [Side; 2],
+    /// In any order.
+    pub gates: &'a [Gate],
+    /// In order of importance: where the page would become too large, the last ones lose pixels first.
+    pub images: Vec<PageImage<'a>>,
+    /// One for each pair of probe files.
+    pub probes: Vec<ProbeComparison>,
+    pub figures: Vec<FigureTable>,
+    pub plots: Vec<Plot>,
+    /// Items that only the candidate has.
+    pub added: Vec<String>,
+    /// Items that only the base has.
+    pub missing: Vec<String>,
+    pub commands: Vec<Command>,
+    pub notes: Vec<String>,
+}
+
+/// One of the two results.
+#[derive(Debug, Clone, Default)]
+pub struct Side {
+    pub path: String,
+    /// Such as "render folder".
+    pub kind: String,
+    pub seed: Option<u64>,
+    pub scene_blake3: Option<String>,
+    /// Effective configuration, RON.
+    pub config: Option<String>,
+}
+
+/// A pair of pictures of one size.
+#[derive(Debug, Clone)]
+pub struct PageImage<'a> {
+    /// Such as "lit/visibility_on".
+    pub name: String,
+    /// Such as "radiance" or "indirect irradiance".
+    pub quantity: String,
+    /// Of the pixels; empty for pure numbers.
+    pub unit: String,
+    pub width: u32,
+    pub height: u32,
+    /// Linear RGB, row 0 at the top, `width · height` of them; display-referred: sRGB codes in [0,1].
+    pub base: Cow<'a, [Vec3]>,
+    pub candidate: Cow<'a, [Vec3]>,
+    /// At which both are shown at first: the base's.
+    pub exposure_ev: f32,
+    /// A PNG: it is shown as it is, without exposure.
+    pub is_display_referred: bool,
+    pub figures: Vec<Figure>,
+    /// Column, row.
+    pub worst_pixel: Option<[u32; 2]>,
+}
+
+impl PageImage<'_> {
+    fn size(&self) -> Size {
+        Size { width: self.width, height: self.height }
+    }
+}
+
+/// A figure of both sides.
+#[derive(Debug, Clone, Default)]
+pub struct Figure {
+    pub name: String,
+    pub base: Option<f64>,
+    pub candidate: Option<f64>,
+    /// Candidate against base: a difference, a ratio − 1, or a figure of the pair.
+    pub value: Option<f64>,
+    pub standard_error: Option<f64>,
+    /// "s" and "bytes" are written as times and sizes; empty for pure numbers.
+    pub unit: String,
+}
+
+/// Figures under one heading, such as those of a report.
+#[derive(Debug, Clone)]
+pub struct FigureTable {
+    pub title: String,
+    pub figures: Vec<Figure>,
+}
+
+/// Two probe files.
+#[derive(Debug, Clone)]
+pub struct ProbeComparison {
+    pub name: String,
+    pub figures: Vec<Figure>,
+    /// The worst probes, worst first.
+    pub worst: Vec<ProbeRow>,
+    pub histograms: Vec<Histogram>,
+}
+
+/// One probe of both files.
+#[derive(Debug, Clone)]
+pub struct ProbeRow {
+    pub index: u64,
+    /// World space, m.
+    pub position_m: [f64; 3],
+    /// Relative difference of mean irradiance, a share.
+    pub irradiance: Option<f64>,
+    /// Largest difference of mean distance, m.
+    pub distance_m: Option<f64>,
+    /// "active", "inside geometry" and so on.
+    pub base_state: String,
+    pub candidate_state: String,
+    pub moved_m: Option<f64>,
+}
+
+/// Differences to count.
+#[derive(Debug, Clone)]
+pub struct Histogram {
+    pub title: String,
+    pub unit: String,
+    /// What each value belongs to, such as "probes".
+    pub what: String,
+    pub values: Vec<f32>,
+}
+
+/// A drawing, shown as a picture: whatever it holds, it cannot run or load anything.
+#[derive(Debug, Clone)]
+pub struct Plot {
+    pub title: String,
+    pub svg: String,
+}
+
+/// A line for a shell.
+#[derive(Debug, Clone)]
+pub struct Command {
+    /// Such as "bake the base".
+    pub purpose: String,
+    pub line: String,
+}
+
+/// The page could not be made.
+#[derive(Debug, Error)]
+pub enum PageError {
+    #[error("the page of the comparison cannot show {name}: {width} × {height} pixels given as {base} and {candidate}")]
+    Size { name: String, width: u32, height: u32, base: usize, candidate: usize },
+    #[error("the page of the comparison cannot be drawn: {0}; report this")]
+    Draw(String),
+    #[error("the page of the comparison cannot be packed: {0}; report this")]
+    Pack(#[from] io::Error),
+    #[error("the page of the comparison cannot be written: {0}; report this")]
+    Template(#[from] minijinja::Error),
+}
+
+const TEMPLATE: &str = include_str!("../assets/page/page.html");
+const MACROS: &str = include_str!("../assets/page/macros.html");
+const STYLE: &str = include_str!("../assets/page/page.css");
+const START: &str = include_str!("../assets/page/start.js");
+const SCRIPTS: [&str; 3] = [
+    include_str!("../assets/page/codec.js"),
+    include_str!("../assets/page/viewer.js"),
+    include_str!("../assets/page/page.js"),
+];
+
+/// What stands for the nonce until it is known. Never in a page that is handed out.
+const NO_NONCE: &str = "0";
+
+/// The page as HTML.
+///
+/// # Errors
+/// Pictures whose pixels do not match their size.
+pub fn render(page: &Page<'_>) -> Result<String, PageError> {
+    let mut environment = Environment::new();
+    // The name's ending turns escaping on.
+    environment.add_template("macros.html", MACROS)?;
+    environment.add_template("page.html", TEMPLATE)?;
+    let template = environment.get_template("page.html")?;
+    let view = minijinja::Value::from(minijinja::value::Serde(view::View::new(page)?));
+    let with_nonce = |nonce: &str| {
+        template.render(
+            context! { page => view.clone(), style => STYLE, start => START, scripts => SCRIPTS, nonce => nonce },
+        )
+    };
+    // A name that is to pass for a script of ours would have to hold the hash of a page that holds that name.
+    let nonce = blake3::hash(with_nonce(NO_NONCE)?.as_bytes()).to_hex();
+    Ok(with_nonce(&nonce[..32])?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::page::embed::tests::pair;
+
+    /// A page whose every text is `text`.
+    fn page_of(text: &str) -> String {
+        let text = text.to_owned();
+        let figure = Figure { name: text.clone(), unit: text.clone(), value: Some(1.0), ..Figure::default() };
+        let side = Side {
+            path: text.clone(),
+            kind: text.clone(),
+            seed: Some(7),
+            scene_blake3: Some(text.clone()),
+            config: Some(text.clone()),
+        };
+        let mut other = side.clone();
+        other.config = Some(format!("{text}!"));
+        let gates = [Gate {
+            name: text.clone(),
+            item: text.clone(),
+            base: None,
+            candidate: Some(1.0),
+            value: Some(2.0),
+            unit: "%",
+            threshold: Some(1.0),
+            margin: Some(-1.0),
+            standard_error: Some(0.1),
+            passed: false,
+            waived: false,
+            source: text.clone(),
+            explanation: text.clone(),
+        }];
+        let mut image = pair(24, 16);
+        image.name = text.clone();
+        image.quantity = text.clone();
+        image.unit = text.clone();
+        image.figures = vec![figure.clone()];
+        let row = ProbeRow {
+            index: 3,
+            position_m: [1.0, f64::NAN, -2.0],
+            irradiance: Some(0.1),
+            distance_m: None,
+            base_state: text.clone(),
+            candidate_state: text.clone(),
+            moved_m: Some(0.0),
+        };
+        let histogram =
+            Histogram { title: text.clone(), unit: text.clone(), what: text.clone(), values: vec![0.1, -0.2] };
+        let page = Page {
+            title: text.clone(),
+            sides: [side, other],
+            gates: &gates,
+            images: vec![image],
+            probes: vec![ProbeComparison {
+                name: text.clone(),
+                figures: vec![figure.clone()],
+                worst: vec![row],
+                histograms: vec![histogram],
+            }],
+            figures: vec![FigureTable { title: text.clone(), figures: vec![figure] }],
+            plots: vec![Plot { title: text.clone(), svg: format!("<svg>{text}</svg>") }],
+            added: vec![text.clone()],
+            missing: vec![text.clone()],
+            commands: vec![Command { purpose: text.clone(), line: text.clone() }],
+            notes: vec![text],
+        };
+        render(&page).unwrap()
+    }
+
+    #[test]
+    fn hostile_names_stay_names() {
+        let harmless = page_of("x");
+        let count = |page: &str, what: &str| page.matches(what).count();
+        for hostile in [
+            "</script><script>boom()</script>",
+            "\"><img src=x onerror=boom()>",
+            "' onfocus='boom()",
+            "<!--",
+            "]]>{{ 7*7 }}",
+        ] {
+            let page = page_of(hostile);
+            for markup in ["<script", "</script", "<img", "<!--", "<svg", "<style"] {
+                assert_eq!(count(&page, markup), count(&harmless, markup), "{markup} by {hostile}");
+            }
+            assert!(!page.contains("onerror=boom") || page.contains("&lt;img src=x onerror=boom"), "{hostile}");
+            assert!(!page.contains("<img src=x") && !page.contains("' onfocus='"), "{hostile}");
+        }
+        assert!(page_of("]]>{{ 7*7 }}").contains("{{ 7*7 }}"));
+    }
+
+    #[test]
+    fn direction_marks_are_spelled_out() {
+        let page = page_of("gnp.\u{202E}exr\u{0007}");
+        // Only the exact line for the clipboard keeps them.
+        let lines = page.lines().filter(|line| line.contains('\u{202E}') || line.contains('\u{0007}'));
+        assert!(lines.clone().all(|line| line.contains("data-copy=")), "{:?}", lines.collect::<Vec<_>>());
+        assert!(page.contains("⟨U+202E⟩"));
+    }
+
+    #[test]
+    fn nothing_is_loaded_from_anywhere() {
+        let page = page_of("x");
+        assert!(page.contains("default-src 'none'"));
+        let links = ["src=", "href=", "url(", "@import", "fetch(", "XMLHttpRequest", "import("];
+        for (link, at) in links.iter().flat_map(|link| page.match_indices(link).map(|(at, _)| (*link, at))) {
+            let rest = page[at + link.len()..].trim_start_matches(['"', '\'']);
+            assert!(rest.starts_with("data:") || rest.starts_with('#'), "{link}{}", &rest[..rest.len().min(40)]);
+        }
+        assert!(!page.contains("unsafe-inline") && !page.contains(" style=") && !page.contains(" onclick="));
+    }
+
+    #[test]
+    fn the_same_input_gives_the_same_page_and_another_another_nonce() {
+        let nonce = |page: &str| page.split("'nonce-").nth(1).map(|rest| rest[..32].to_owned()).unwrap();
+        assert_eq!(page_of("x"), page_of("x"));
+        assert_ne!(nonce(&page_of("x")), nonce(&page_of("y")));
+    }
+
+    #[test]
+    fn pixels_must_match_their_size() {
+        let side = || Side::default();
+        let mut image = pair(24, 16);
+        image.width = 25;
+        let page = Page {
+            title: String::new(),
+            sides: [side(), side()],
+            gates: &[],
+            images: vec![image],
+            probes: Vec::new(),
+            figures: Vec::new(),
+            plots: Vec::new(),
+            added: Vec::new(),
+            missing: Vec::new(),
+            commands: Vec::new(),
+            notes: Vec::new(),
+        };
+        assert!(matches!(render(&page), Err(PageError::Size { width: 25, .. })));
+    }
+}

@@ -1,0 +1,85 @@
+//! Small pictures that need no script: for print, for browsers without one, and until the real ones are decoded.
+
+use std::io;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use glam::Vec3;
+
+use super::PageImage;
+use super::shrink::{Size, mean_of_blocks, peak_of_blocks};
+use crate::image::{Picture8, tonemap};
+use crate::math::color::byte_from_unit;
+use crate::report::colormap::{Colormap, MISSING};
+use crate::report::legend::{self, Legend};
+
+/// Marks pixels that are no light: a colour that light seldom has.
+pub const MARK: [u8; 3] = [255, 0, 255];
+
+/// Widths of small pictures for up to so many pairs, px: many pairs would else fill the page by these alone.
+const WIDTHS: [(usize, u32); 2] = [(8, 800), (24, 480)];
+const LEAST_WIDTH: u32 = 320;
+
+/// Width of the legend at zoom 1, px: that of a telephone.
+const LEGEND_WIDTH: u32 = 372;
+/// Pixels of the legend's picture for one of the page, for screens that have several.
+const LEGEND_ZOOM: u32 = 2;
+
+/// The width of small pictures in a page of so many pairs, px.
+pub fn width_for(pairs: usize) -> u32 {
+    WIDTHS.iter().find(|(most, _)| pairs <= *most).map_or(LEAST_WIDTH, |(_, width)| *width)
+}
+
+/// One side, at the pair's exposure, at most `width` wide, as a data URI.
+///
+/// # Errors
+/// None in practice: the writer is memory.
+pub fn side(image: &PageImage<'_>, pixels: &[Vec3], width: u32) -> io::Result<String> {
+    let factor = image.width.div_ceil(width).max(1);
+    let color = |pixel: Vec3| {
+        if !pixel.is_finite() {
+            MARK
+        } else if image.is_display_referred {
+            pixel.to_array().map(byte_from_unit)
+        } else {
+            tonemap(pixel, image.exposure_ev).to_array().map(byte_from_unit)
+        }
+    };
+    jpeg(image.size().shrunk(factor), mean_of_blocks(pixels, image.size(), factor).into_iter().map(color).collect())
+}
+
+/// The differences in the colours of `colormap`, as a data URI.
+///
+/// # Errors
+/// None in practice: the writer is memory.
+pub fn heatmap(values: &[f32], size: Size, colormap: Colormap, width: u32) -> io::Result<String> {
+    let factor = size.width.div_ceil(width).max(1);
+    let values = peak_of_blocks(values, size, factor);
+    jpeg(size.shrunk(factor), values.into_iter().map(|value| colormap.color(value)).collect())
+}
+
+/// The strip that explains the heat map's colours, as a data URI.
+///
+/// # Errors
+/// None in practice: the writer is memory.
+pub fn legend(values: &[f32], colormap: Colormap, unit: &str) -> io::Result<String> {
+    let [low, high] = colormap.range();
+    let legend = Legend {
+        title: "candidate − base",
+        unit,
+        colormap,
+        missing: values.iter().any(|value| !value.is_finite()).then_some("no number"),
+        beyond: [values.iter().any(|&value| value < low), values.iter().any(|&value| value > high)],
+    };
+    let mut picture = Picture8::filled(LEGEND_WIDTH * LEGEND_ZOOM, legend::HEIGHT * LEGEND_ZOOM, MISSING);
+    legend.draw(&mut picture, 0, LEGEND_ZOOM);
+    let mut bytes = Vec::new();
+    picture.encode_png(&mut bytes)?;
+    Ok(format!("data:image/png;base64,{}", STANDARD.encode(bytes)))
+}
+
+fn jpeg(size: Size, pixels: Vec<[u8; 3]>) -> io::Result<String> {
+    let mut bytes = Vec::new();
+    Picture8 { width: size.width, height: size.height, pixels }.encode_jpeg(&mut bytes)?;
+    Ok(format!("data:image/jpeg;base64,{}", STANDARD.encode(bytes)))
+}

@@ -1,0 +1,462 @@
+//! What the template gets: everything as text, sorted and formatted.
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::embed::{Embedded, differences};
+use super::lines::{Line, differing_lines};
+use super::shrink::Size;
+use super::visible::visible;
+use super::{Figure, FigureTable, Page, PageError, PageImage, ProbeComparison, Side, budget, codes, histogram, still};
+use crate::report::colormap::{Colormap, Scale};
+use crate::report::diff::gate::Gate;
+use crate::report::format;
+use crate::report::heatmap::range_of;
+
+/// Colours of the heat map that the page looks up: one for each of 8 bits.
+const COLORS: usize = 256;
+
+/// Digits of figures: one more than tables of the terminal, as small differences are what the page is about.
+const DIGITS: usize = 4;
+
+#[derive(Debug, Serialize)]
+pub struct View {
+    title: String,
+    version: &'static str,
+    passed: bool,
+    failing: usize,
+    judged: usize,
+    waived: usize,
+    first: Option<GateView>,
+    gates: Vec<GateView>,
+    sides: Vec<SideView>,
+    /// `None`: not told on both sides, or too long.
+    config_lines: Option<Vec<Line>>,
+    images: Vec<ImageView>,
+    probes: Vec<ProbesView>,
+    figures: Vec<TableView>,
+    plots: Vec<PlotView>,
+    added: Vec<String>,
+    missing: Vec<String>,
+    commands: Vec<CommandView>,
+    notes: Vec<String>,
+    colors: String,
+    codes: Codes,
+}
+
+/// Constants that the page's script decodes with.
+#[derive(Debug, Serialize)]
+struct Codes {
+    per_octave: f64,
+    offset: i16,
+    per_asinh: f64,
+    infinite: i16,
+    nan: i16,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct GateView {
+    name: String,
+    item: String,
+    state: &'static str,
+    /// For sorting: failing first.
+    rank: u8,
+    base: Cell,
+    candidate: Cell,
+    value: Cell,
+    threshold: Cell,
+    margin: Cell,
+    /// Width of the margin's bar, 0 to 100, and whether it reaches to the bad side.
+    bar: f64,
+    is_beyond: bool,
+    source: String,
+    explanation: String,
+}
+
+/// A number for people, and for sorting.
+#[derive(Debug, Clone, Serialize)]
+struct Cell {
+    text: String,
+    raw: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct SideView {
+    label: &'static str,
+    path: String,
+    kind: String,
+    seed: String,
+    scene: String,
+}
+
+#[derive(Debug, Serialize)]
+struct FigureView {
+    name: String,
+    base: String,
+    candidate: String,
+    value: String,
+}
+
+#[derive(Debug, Serialize)]
+struct TableView {
+    title: String,
+    figures: Vec<FigureView>,
+}
+
+#[derive(Debug, Serialize)]
+struct ImageView {
+    name: String,
+    quantity: String,
+    unit: String,
+    width: u32,
+    height: u32,
+    exposure_ev: f32,
+    is_display_referred: bool,
+    worst: Option<[u32; 2]>,
+    non_finite: [u64; 2],
+    range: f32,
+    range_text: String,
+    embedded: Option<EmbeddedView>,
+    base: String,
+    candidate: String,
+    difference: String,
+    legend: String,
+    histogram: histogram::Drawn,
+    figures: Vec<FigureView>,
+}
+
+#[derive(Debug, Serialize)]
+struct EmbeddedView {
+    factor: u32,
+    width: u32,
+    height: u32,
+    scale: f64,
+    is_candidate_relative: bool,
+    base: String,
+    candidate: String,
+    difference: String,
+}
+
+#[derive(Debug, Serialize)]
+struct ProbesView {
+    name: String,
+    figures: Vec<FigureView>,
+    worst: Vec<ProbeView>,
+    histograms: Vec<TitledHistogram>,
+}
+
+#[derive(Debug, Serialize)]
+struct ProbeView {
+    index: u64,
+    position: [String; 3],
+    irradiance: String,
+    distance: String,
+    moved: String,
+    base_state: String,
+    candidate_state: String,
+}
+
+#[derive(Debug, Serialize)]
+struct TitledHistogram {
+    title: String,
+    drawn: histogram::Drawn,
+}
+
+#[derive(Debug, Serialize)]
+struct PlotView {
+    title: String,
+    data: String,
+}
+
+#[derive(Debug, Serialize)]
+struct CommandView {
+    purpose: String,
+    shown: String,
+    line: String,
+}
+
+impl View {
+    pub fn new(page: &Page<'_>) -> Result<View, PageError> {
+        let mut gates: Vec<GateView> = page.gates.iter().map(gate).collect();
+        gates.sort_by(|a, b| a.rank.cmp(&b.rank).then_with(|| margin_of(a).total_cmp(&margin_of(b))));
+        let failing = gates.iter().filter(|gate| gate.state == "fail").count();
+        Ok(View {
+            title: visible(&page.title),
+            version: env!("CARGO_PKG_VERSION"),
+            passed: failing == 0,
+            failing,
+            judged: page.gates.iter().filter(|gate| gate.threshold.is_some() || !gate.passed).count(),
+            waived: gates.iter().filter(|gate| gate.state == "waived").count(),
+            first: gates.first().filter(|gate| gate.state == "fail").cloned(),
+            gates,
+            sides: page.sides.iter().zip(["base", "candidate"]).map(|(side, label)| side_view(side, label)).collect(),
+            config_lines: config_lines(&page.sides),
+            images: images(&page.images)?,
+            probes: page.probes.iter().map(probes).collect::<Result<_, _>>()?,
+            figures: page.figures.iter().map(table).collect(),
+            plots: page.plots.iter().map(plot).collect(),
+            added: page.added.iter().map(|item| visible(item)).collect(),
+            missing: page.missing.iter().map(|item| visible(item)).collect(),
+            commands: page.commands.iter().map(command).collect(),
+            notes: page.notes.iter().map(|note| visible(note)).collect(),
+            colors: colors(),
+            codes: Codes {
+                per_octave: codes::PER_OCTAVE,
+                offset: codes::OFFSET,
+                per_asinh: codes::PER_ASINH,
+                infinite: codes::INFINITE,
+                nan: codes::NAN,
+            },
+        })
+    }
+}
+
+/// Undefined margins come last among their like.
+fn margin_of(gate: &GateView) -> f64 {
+    gate.margin.raw.unwrap_or(f64::INFINITY)
+}
+
+fn gate(gate: &Gate) -> GateView {
+    let (state, rank) = match (gate.passed, gate.waived) {
+        (_, true) => ("waived", 1),
+        (false, false) => ("fail", 0),
+        (true, false) if gate.threshold.is_none() => ("shown", 3),
+        (true, false) => ("pass", 2),
+    };
+    let plain = |value: Option<f64>| cell(value, |value| format::significant(value, DIGITS));
+    let margin = gate.margin.filter(|margin| margin.is_finite());
+    GateView {
+        name: visible(&gate.name),
+        item: visible(&gate.item),
+        state,
+        rank,
+        base: plain(gate.base),
+        candidate: plain(gate.candidate),
+        value: Cell { text: with_unit(gate.value, gate.standard_error, gate.unit), raw: finite(gate.value) },
+        threshold: Cell { text: threshold(gate), raw: finite(gate.threshold) },
+        margin: cell(margin, format::percent),
+        bar: 100.0 * margin.unwrap_or(0.0).abs().min(1.0),
+        is_beyond: margin.is_some_and(|margin| margin < 0.0),
+        source: visible(&gate.source),
+        explanation: visible(&gate.explanation),
+    }
+}
+
+/// A threshold as somebody wrote it: without the zeros that make figures as long as each other.
+fn threshold(gate: &Gate) -> String {
+    let text = with_unit(gate.threshold, None, gate.unit);
+    match text.split_once(' ') {
+        Some((number, unit)) => format!("{} {unit}", trimmed(number)),
+        None => trimmed(&text).to_owned(),
+    }
+}
+
+fn trimmed(number: &str) -> &str {
+    let is_fraction = number.contains('.') && !number.contains('e');
+    if is_fraction { number.trim_end_matches('0').trim_end_matches('.') } else { number }
+}
+
+fn finite(value: Option<f64>) -> Option<f64> {
+    value.filter(|value| value.is_finite())
+}
+
+fn cell(value: Option<f64>, text: impl FnOnce(f64) -> String) -> Cell {
+    Cell { text: format::or_undefined(value, text), raw: finite(value) }
+}
+
+/// A figure with its unit, as people write it.
+fn with_unit(value: Option<f64>, standard_error: Option<f64>, unit: &str) -> String {
+    let Some(value) = value else { return format::UNDEFINED.to_owned() };
+    match unit {
+        "s" => format::seconds(value),
+        "bytes" | "B" if value < 0.0 => format!("-{}", format::bytes(-value as u64)),
+        "bytes" | "B" => format::bytes(value as u64),
+        _ => {
+            let number = match standard_error {
+                Some(_) => format::with_error(value, standard_error),
+                None => format::significant(value, DIGITS),
+            };
+            visible(format!("{number} {unit}").trim_end())
+        }
+    }
+}
+
+fn side_view(side: &Side, label: &'static str) -> SideView {
+    SideView {
+        label,
+        path: visible(&side.path),
+        kind: visible(&side.kind),
+        seed: format::or_undefined(side.seed, |seed| seed.to_string()),
+        scene: format::or_undefined(side.scene_blake3.as_deref(), visible),
+    }
+}
+
+fn config_lines(sides: &[Side; 2]) -> Option<Vec<Line>> {
+    let [base, candidate] = sides;
+    let lines = differing_lines(base.config.as_deref()?, candidate.config.as_deref()?)?;
+    Some(lines.into_iter().map(|line| Line { text: visible(&line.text), ..line }).collect())
+}
+
+fn table(table: &FigureTable) -> TableView {
+    TableView { title: visible(&table.title), figures: figures(&table.figures) }
+}
+
+fn figures(figures: &[Figure]) -> Vec<FigureView> {
+    let view = |figure: &Figure| FigureView {
+        name: visible(&figure.name),
+        base: with_unit(figure.base, None, &figure.unit),
+        candidate: with_unit(figure.candidate, None, &figure.unit),
+        value: with_unit(figure.value, figure.standard_error, &figure.unit),
+    };
+    figures.iter().map(view).collect()
+}
+
+fn plot(plot: &super::Plot) -> PlotView {
+    let data = format!("data:image/svg+xml;base64,{}", STANDARD.encode(&plot.svg));
+    PlotView { title: visible(&plot.title), data }
+}
+
+fn command(command: &super::Command) -> CommandView {
+    CommandView { purpose: visible(&command.purpose), shown: visible(&command.line), line: command.line.clone() }
+}
+
+/// The heat map's colours from its low to its high end, RGB bytes.
+fn colors() -> String {
+    let map = Colormap::new(Scale::Diverging, [-1.0, 1.0]);
+    let bytes: Vec<u8> = (0..COLORS).flat_map(|i| map.color_at(i as f64 / (COLORS - 1) as f64)).collect();
+    STANDARD.encode(bytes)
+}
+
+/// A picture's parts that do not depend on how much room there is.
+struct Prepared {
+    difference: Vec<f32>,
+    colormap: Colormap,
+    range: f32,
+}
+
+fn images(images: &[PageImage<'_>]) -> Result<Vec<ImageView>, PageError> {
+    for image in images {
+        let (base, candidate) = (image.base.len(), image.candidate.len());
+        if base != image.size().pixels() || candidate != base || base == 0 {
+            let (name, width, height) = (visible(&image.name), image.width, image.height);
+            return Err(PageError::Size { name, width, height, base, candidate });
+        }
+    }
+    let prepare = |image: &PageImage<'_>| {
+        let difference = differences(image);
+        let colormap = Colormap::new(Scale::Diverging, range_of(&difference, Scale::Diverging));
+        let range = colormap.range()[1];
+        Prepared { difference, colormap, range }
+    };
+    let prepared: Vec<Prepared> = images.iter().map(prepare).collect();
+    let mut views = images
+        .par_iter()
+        .zip(&prepared)
+        .map(|(image, prepared)| view(image, prepared, still::width_for(images.len())))
+        .collect::<Result<Vec<_>, _>>()?;
+    let stills =
+        |view: &ImageView| view.base.len() + view.candidate.len() + view.difference.len() + 2 * view.legend.len();
+    let room = budget::PICTURES_BYTES.saturating_sub(views.iter().map(stills).sum());
+    let embedded = budget::fit(images.len(), room, |i, factor| {
+        Embedded::new(&images[i], &prepared[i].difference, prepared[i].range, factor)
+    })?;
+    for (view, embedded) in views.iter_mut().zip(embedded) {
+        view.embedded = embedded.map(|embedded| {
+            let Embedded {
+                factor,
+                size: Size { width, height },
+                base,
+                candidate,
+                is_candidate_relative,
+                difference,
+                scale,
+            } = embedded;
+            EmbeddedView { factor, width, height, scale, is_candidate_relative, base, candidate, difference }
+        });
+    }
+    Ok(views)
+}
+
+fn view(image: &PageImage<'_>, prepared: &Prepared, width: u32) -> Result<ImageView, PageError> {
+    let Prepared { difference, colormap, range } = prepared;
+    let non_finite = |pixels: &[glam::Vec3]| pixels.iter().filter(|pixel| !pixel.is_finite()).count() as u64;
+    let unit = visible(&image.unit);
+    Ok(ImageView {
+        name: visible(&image.name),
+        quantity: visible(&image.quantity),
+        width: image.width,
+        height: image.height,
+        exposure_ev: image.exposure_ev,
+        is_display_referred: image.is_display_referred,
+        worst: image.worst_pixel,
+        non_finite: [non_finite(&image.base), non_finite(&image.candidate)],
+        range: *range,
+        range_text: format!("{} {unit}", format::significant(f64::from(*range), DIGITS)).trim_end().to_owned(),
+        embedded: None,
+        base: still::side(image, &image.base, width)?,
+        candidate: still::side(image, &image.candidate, width)?,
+        difference: still::heatmap(difference, image.size(), *colormap, width)?,
+        legend: still::legend(difference, *colormap, &unit)?,
+        histogram: histogram::draw(difference, f64::from(*range), &unit, "pixels").map_err(PageError::Draw)?,
+        figures: figures(&image.figures),
+        unit,
+    })
+}
+
+fn probes(probes: &ProbeComparison) -> Result<ProbesView, PageError> {
+    let length =
+        |value: Option<f64>| format::or_undefined(value, |value| format!("{} m", format::significant(value, 3)));
+    let row = |probe: &super::ProbeRow| ProbeView {
+        index: probe.index,
+        position: probe.position_m.map(|coordinate| format::significant(coordinate, DIGITS)),
+        irradiance: format::or_undefined(probe.irradiance, format::percent),
+        distance: length(probe.distance_m),
+        moved: length(probe.moved_m),
+        base_state: visible(&probe.base_state),
+        candidate_state: visible(&probe.candidate_state),
+    };
+    let histogram = |histogram: &super::Histogram| {
+        let range =
+            f64::from(Colormap::new(Scale::Diverging, range_of(&histogram.values, Scale::Diverging)).range()[1]);
+        let drawn = histogram::draw(&histogram.values, range, &visible(&histogram.unit), &visible(&histogram.what))
+            .map_err(PageError::Draw)?;
+        Ok(TitledHistogram { title: visible(&histogram.title), drawn })
+    };
+    Ok(ProbesView {
+        name: visible(&probes.name),
+        figures: figures(&probes.figures),
+        worst: probes.worst.iter().map(row).collect(),
+        histograms: probes.histograms.iter().map(histogram).collect::<Result<_, PageError>>()?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_have_their_unit() {
+        let cases = [
+            (Some(0.0123), "s", "12.3 ms"),
+            (Some(2048.0), "bytes", "2.00 KiB"),
+            (Some(-2048.0), "bytes", "-2.00 KiB"),
+            (Some(0.5), "%", "0.5000 %"),
+            (Some(f64::NAN), "", "–"),
+            (None, "m", "–"),
+        ];
+        for (value, unit, text) in cases {
+            assert_eq!(with_unit(value, None, unit), text);
+        }
+        assert_eq!(with_unit(Some(0.031), Some(0.0031), "m"), "0.0310 ± 0.0031 m");
+    }
+
+    #[test]
+    fn thresholds_are_short() {
+        for (long, short) in [("0.02000", "0.02"), ("20.00", "20"), ("100", "100"), ("1.00e-7", "1.00e-7"), ("–", "–")]
+        {
+            assert_eq!(trimmed(long), short);
+        }
+    }
+}

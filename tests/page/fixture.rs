@@ -1,0 +1,194 @@
+//! A comparison made up: light of many magnitudes, a pixel that is no number, names that would break a careless page.
+
+use std::borrow::Cow;
+
+use glam::Vec3;
+use lightprobe::report::diff::gate::Gate;
+use lightprobe::report::page::{
+    Command, Figure, FigureTable, Histogram, Page, PageImage, Plot, ProbeComparison, ProbeRow, Side,
+};
+
+/// Breaks out of attributes, elements, scripts and comments, and turns the text after it around.
+pub const HOSTILE: &str = "</script><img src=x onerror=\"window.boom=1\">'\"`<!-- \u{202E}gnp.exr";
+
+pub const WIDTH: u32 = 32;
+pub const HEIGHT: u32 = 18;
+/// Of the first pair.
+pub const EXPOSURE_EV: f32 = 0.5;
+/// Of the candidate that is no number, in the first pair.
+pub const NAN_AT: (u32, u32) = (20, 12);
+
+/// The linear light of a pixel of the first pair.
+pub fn light(side: usize, x: u32, y: u32) -> Vec3 {
+    let base = Vec3::new(0.02 + 0.03 * x as f32, 0.4, (0.35 * y as f32 - 4.0).exp2());
+    if side == 0 { base } else { Vec3::new(base.z, 0.5 * base.y + 0.01 * x as f32, base.x) }
+}
+
+fn pair(name: &str, width: u32, height: u32, of: impl Fn(usize, u32, u32) -> Vec3) -> PageImage<'static> {
+    let side = |side| -> Cow<'static, [Vec3]> {
+        Cow::Owned((0..width * height).map(|i| of(side, i % width, i / width)).collect())
+    };
+    PageImage {
+        name: name.to_owned(),
+        quantity: "radiance".to_owned(),
+        unit: "W·m⁻²·sr⁻¹".to_owned(),
+        width,
+        height,
+        base: side(0),
+        candidate: side(1),
+        exposure_ev: EXPOSURE_EV,
+        is_display_referred: false,
+        figures: vec![
+            Figure { name: "rmse".to_owned(), value: Some(0.0123), ..Figure::default() },
+            Figure { name: "psnr".to_owned(), value: None, unit: "dB".to_owned(), ..Figure::default() },
+        ],
+        worst_pixel: Some([width / 3, height / 2]),
+    }
+}
+
+pub fn gate(name: &str, item: &str, value: f64, threshold: f64) -> Gate {
+    Gate {
+        name: name.to_owned(),
+        item: item.to_owned(),
+        base: Some(0.65),
+        candidate: Some(0.65 + value),
+        value: Some(value),
+        unit: "",
+        threshold: Some(threshold),
+        margin: Some(1.0 - value / threshold),
+        standard_error: (value > 0.02).then_some(0.1 * value),
+        passed: value <= threshold,
+        waived: false,
+        source: "default".to_owned(),
+        explanation: format!(
+            "The {name} of the candidate against that of the base, over all pixels that show a surface."
+        ),
+    }
+}
+
+pub fn gates() -> Vec<Gate> {
+    let mut gates = vec![
+        gate("image.flip", "lit/visibility_on", 0.012, 0.05),
+        gate("leak.light", "dark/visibility_on", 0.5, 0.02),
+        gate("irradiance.mean", HOSTILE, 0.031, 0.004),
+        gate("probes.worst", "two_rooms_open.probes", 0.03, 0.2),
+    ];
+    gates.push(Gate {
+        passed: false,
+        waived: true,
+        source: "--allow-scene-change".to_owned(),
+        ..gate("scene", "", 1.0, 0.5)
+    });
+    gates.push(Gate { threshold: None, margin: None, unit: "s", ..gate("time.bake", "bake", 0.083, 1.0) });
+    gates.push(Gate { value: None, margin: None, base: None, candidate: None, ..gate("image.psnr", "lit", 0.0, 1.0) });
+    gates.extend((0..16).map(|i| gate("leak.dark", &format!("camera {i}"), 0.001 * f64::from(i), 0.02)));
+    gates
+}
+
+/// A page of these pairs.
+pub fn page_of(images: Vec<PageImage<'static>>) -> String {
+    let gates = gates();
+    let config =
+        |visibility: &str| format!("(\n    grid: (spacing_m: 1.0),\n    query: (visibility: {visibility}),\n)\n");
+    let side = |label: &str, visibility: &str| Side {
+        path: format!("out/{label}/{HOSTILE}"),
+        kind: "render folder".to_owned(),
+        seed: Some(7),
+        scene_blake3: Some("4f1ab0c2".repeat(8)),
+        config: Some(config(visibility)),
+    };
+    let row = |i: u64| ProbeRow {
+        index: 17 * i,
+        position_m: [i as f64 - 3.5, 1.25, 0.125 * i as f64],
+        irradiance: Some(0.4 / (1.0 + i as f64)),
+        distance_m: (i > 2).then_some(0.03),
+        base_state: "active".to_owned(),
+        candidate_state: if i == 1 { "inside geometry" } else { "active" }.to_owned(),
+        moved_m: Some(0.0),
+    };
+    let differences = (0..300).map(|i| (i as f32 * 0.7).sin().powi(5) * 0.2).collect();
+    let figure = |name: &str, unit: &str, base: f64, candidate: f64| Figure {
+        name: name.to_owned(),
+        base: Some(base),
+        candidate: Some(candidate),
+        value: Some(candidate - base),
+        standard_error: None,
+        unit: unit.to_owned(),
+    };
+    let page = Page {
+        title: "two_rooms_open, default against visibility off".to_owned(),
+        sides: [side("base", "moments(power: 3, floor: 0.05)"), side("candidate", "none")],
+        gates: &gates,
+        images,
+        probes: vec![ProbeComparison {
+            name: "two_rooms_open.probes".to_owned(),
+            figures: vec![figure("probes", "", 300.0, 300.0), figure("mean irradiance", "W·m⁻²", 1.271, 1.05)],
+            worst: (0..10).map(row).collect(),
+            histograms: vec![Histogram {
+                title: "Relative difference of irradiance".to_owned(),
+                unit: String::new(),
+                what: "probes".to_owned(),
+                values: differences,
+            }],
+        }],
+        figures: vec![
+            FigureTable {
+                title: "lit/report.json".to_owned(),
+                figures: vec![figure("shade_ms.median", "s", 0.0123, 0.0119), figure("peak memory", "bytes", 3.0e8, 2.9e8)],
+            },
+            FigureTable { title: HOSTILE.to_owned(), figures: vec![figure(HOSTILE, "", 1.0, 2.0)] },
+        ],
+        plots: vec![Plot {
+            title: "Error against time".to_owned(),
+            svg: "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 400 200\"><script>window.boom=2</script>\
+                  <image href=\"http://example.org/x.png\"/><path d=\"M20 20 L380 180\" stroke=\"#06c\"/></svg>"
+                .to_owned(),
+        }],
+        added: vec!["dark/extra.exr".to_owned()],
+        missing: vec![HOSTILE.to_owned()],
+        commands: vec![
+            Command {
+                purpose: "Bake the candidate".to_owned(),
+                line: "lightprobe bake scenes/two_rooms_open.glb -o candidate.probes --set grid.spacing_m=1 --set query.visibility=none --seed 7".to_owned(),
+            },
+            Command { purpose: "Compare".to_owned(), line: format!("lightprobe diff-report base '{HOSTILE}' -o diff") },
+        ],
+        notes: vec!["Same seed and configuration of capture: noise explains nothing.".to_owned()],
+    };
+    lightprobe::report::page::render(&page).unwrap()
+}
+
+/// Three pairs: light with a pixel that is no number, a hostile name, a PNG.
+pub fn page() -> String {
+    let mut first = pair("lit/visibility_on: beauty", WIDTH, HEIGHT, light);
+    first.candidate.to_mut()[(NAN_AT.1 * WIDTH + NAN_AT.0) as usize] = Vec3::new(0.1, f32::NAN, 0.1);
+    let second = pair(HOSTILE, 48, 20, |side, x, y| light(side, x % WIDTH, y % HEIGHT) * 1.0e4);
+    let mut third =
+        pair("probes.png", 40, 30, |side, x, y| Vec3::new(x as f32 / 40.0, y as f32 / 30.0, 0.5 * side as f32));
+    third.is_display_referred = true;
+    third.unit = String::new();
+    page_of(vec![first, second, third])
+}
+
+/// Pairs of 1920 × 1080 pixels with smooth shading, edges, texture and, with `noise`, relative noise of that size.
+pub fn large_page(pairs: u32, noise: f32) -> String {
+    let of = |p: u32| {
+        move |side: usize, x: u32, y: u32| {
+            let (u, v) = (x as f32 / 1920.0, y as f32 / 1080.0);
+            let wall = if (u * 5.0).fract() < 0.2 + 0.4 * v { 0.8 } else { 0.25 };
+            let shade = (0.2 + (3.1 * u + p as f32).sin().abs()) / (0.3 + (u - 0.4).powi(2) + (v - 0.6).powi(2));
+            let tile = if ((x / 60) ^ (y / 60)) & 1 == 0 { 1.0 } else { 0.7 };
+            // Any well-mixed bits do: they only must not compress.
+            let mut bits = x.wrapping_mul(0x9E37_79B9)
+                ^ y.wrapping_mul(0x85EB_CA6B)
+                ^ (side as u32 + 2 * p).wrapping_mul(0xC2B2_AE35);
+            for _ in 0..2 {
+                bits = (bits ^ (bits >> 15)).wrapping_mul(0x2C1B_3C6D);
+            }
+            let grain = 1.0 + noise * ((bits >> 8) as f32 / (1 << 24) as f32 - 0.5);
+            let change = if side == 1 { 1.0 + 0.3 * (4.0 * v).sin() * u } else { 1.0 };
+            Vec3::new(0.9, 0.75, 0.6) * wall * shade * tile * grain * change
+        }
+    };
+    page_of((0..pairs).map(|p| pair(&format!("camera {p}"), 1920, 1080, of(p))).collect())
+}

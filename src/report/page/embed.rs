@@ -142,7 +142,7 @@ pub(super) mod tests {
             let pixel = |i: u32| {
                 let (x, y) = ((i % width) as f32, (i / width) as f32);
                 let magnitude = ((0.31 * x + turn).sin() * 9.0 - 0.2 * y).exp2();
-                Vec3::new(magnitude, 0.7 * magnitude + 0.01, if i % 11 == 0 { 0.0 } else { 0.2 * magnitude })
+                Vec3::new(magnitude, 0.7 * magnitude + 0.01, if i.is_multiple_of(11) { 0.0 } else { 0.2 * magnitude })
             };
             (0..width * height).map(pixel).collect()
         };

@@ -7,6 +7,7 @@ mod budget;
 mod codes;
 mod embed;
 mod histogram;
+mod images;
 mod lines;
 mod pack;
 mod shrink;

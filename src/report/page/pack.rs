@@ -42,7 +42,7 @@ fn residuals(plane: &[i16], width: usize) -> Vec<u16> {
 
 /// The prediction of code `i` from those before it.
 fn predict(plane: &[i16], width: usize, i: usize) -> i16 {
-    let (first_column, first_row) = (i % width == 0, i < width);
+    let (first_column, first_row) = (i.is_multiple_of(width), i < width);
     let left = if first_column { 0 } else { plane[i - 1] };
     let upper = if first_row { 0 } else { plane[i - width] };
     let corner = if first_column || first_row { 0 } else { plane[i - width - 1] };

@@ -20,6 +20,9 @@ pub const MARK: [u8; 3] = [255, 0, 255];
 const WIDTHS: [(usize, u32); 2] = [(8, 800), (24, 480)];
 const LEAST_WIDTH: u32 = 320;
 
+/// Pictures of up to so many pixels are kept without loss.
+const MOST_PNG_PIXELS: usize = 128 * 128;
+
 /// Width of the legend at zoom 1, px: that of a telephone.
 const LEGEND_WIDTH: u32 = 372;
 /// Pixels of the legend's picture for one of the page, for screens that have several.
@@ -45,7 +48,7 @@ pub fn side(image: &PageImage<'_>, pixels: &[Vec3], width: u32) -> io::Result<St
             tonemap(pixel, image.exposure_ev).to_array().map(byte_from_unit)
         }
     };
-    jpeg(image.size().shrunk(factor), mean_of_blocks(pixels, image.size(), factor).into_iter().map(color).collect())
+    data_uri(image.size().shrunk(factor), mean_of_blocks(pixels, image.size(), factor).into_iter().map(color).collect())
 }
 
 /// The differences in the colours of `colormap`, as a data URI.
@@ -55,7 +58,7 @@ pub fn side(image: &PageImage<'_>, pixels: &[Vec3], width: u32) -> io::Result<St
 pub fn heatmap(values: &[f32], size: Size, colormap: Colormap, width: u32) -> io::Result<String> {
     let factor = size.width.div_ceil(width).max(1);
     let values = peak_of_blocks(values, size, factor);
-    jpeg(size.shrunk(factor), values.into_iter().map(|value| colormap.color(value)).collect())
+    data_uri(size.shrunk(factor), values.into_iter().map(|value| colormap.color(value)).collect())
 }
 
 /// The strip that explains the heat map's colours, as a data URI.
@@ -78,8 +81,16 @@ pub fn legend(values: &[f32], colormap: Colormap, unit: &str) -> io::Result<Stri
     Ok(format!("data:image/png;base64,{}", STANDARD.encode(bytes)))
 }
 
-fn jpeg(size: Size, pixels: Vec<[u8; 3]>) -> io::Result<String> {
+/// A picture as a data URI: as JPEG, unless it is so small that single pixels are seen.
+fn data_uri(size: Size, pixels: Vec<[u8; 3]>) -> io::Result<String> {
+    let picture = Picture8 { width: size.width, height: size.height, pixels };
     let mut bytes = Vec::new();
-    Picture8 { width: size.width, height: size.height, pixels }.encode_jpeg(&mut bytes)?;
-    Ok(format!("data:image/jpeg;base64,{}", STANDARD.encode(bytes)))
+    let kind = if size.pixels() <= MOST_PNG_PIXELS {
+        picture.encode_png(&mut bytes)?;
+        "png"
+    } else {
+        picture.encode_jpeg(&mut bytes)?;
+        "jpeg"
+    };
+    Ok(format!("data:image/{kind};base64,{}", STANDARD.encode(bytes)))
 }

@@ -110,7 +110,7 @@ pub struct Solution {
     pub non_finite: u64,
     /// Whether sweeps are being combined.
     accelerating: bool,
-    /// Sweeps in a row that did not lower the smallest residual yet.
+    /// Sweeps since the residual last halved, and what it then was.
     stalled: u32,
     smallest_residual: Option<f64>,
     /// Of the estimate of the spectral radius, the best so far; `None` where it is a ratio of changes.
@@ -238,8 +238,11 @@ impl Solution {
         let radius = self.spectral_radius_estimate.unwrap_or(f64::from(settings.albedo_max));
         let missing = if radius < 1.0 { residual * radius / (1.0 - radius) } else { f64::INFINITY };
         let tolerance = f64::from(settings.tolerance);
-        self.stalled = if self.smallest_residual.is_some_and(|s| residual >= s) { self.stalled + 1 } else { 0 };
-        self.smallest_residual = Some(self.smallest_residual.map_or(residual, |s| s.min(residual)));
+        if self.smallest_residual.is_none_or(|smallest| residual < 0.5 * smallest) {
+            (self.smallest_residual, self.stalled) = (Some(residual), 0);
+        } else {
+            self.stalled += 1;
+        }
         let at_rounding = self.stalled >= 3 && residual <= ROUNDINGS * f64::from(f32::EPSILON);
         self.last_change = Some(change.to_array());
         self.converged = change_max == 0.0 || missing <= tolerance || at_rounding;

@@ -91,7 +91,7 @@ mod tests {
         assert_eq!(interpolate(&points, 0.9), None);
         assert_eq!(interpolate(&points, 1e6), Some(law(100.0)));
         // A beaten point plays no part.
-        let with = [&points[..], &[(2.0, 11.9)]].concat();
+        let with = [&points[..], &[(2.0, 12.5)]].concat();
         assert_eq!(interpolate(&with, 2.0), interpolate(&points, 2.0));
         assert_eq!(interpolate(&[(1.0, 1.0), (4.0, 0.0)], 2.0), Some(1.0));
         assert_eq!(interpolate(&[], 2.0), None);

@@ -31,8 +31,8 @@ impl Axis {
 /// Share of the range that stays free on both sides.
 const PADDING: f64 = 0.05;
 
-/// A range without length is widened to this factor on both sides of a logarithmic axis.
-const SINGLE_FACTOR: f64 = 2.0;
+/// A range shorter than this factor is widened by it on both sides of a logarithmic axis: tiny differences should look tiny.
+const SINGLE_FACTOR: f64 = 1.1;
 
 /// Decades up to which all digits are labelled, up to which 2 and 5 are besides 1, and up to which all have ticks.
 const DECADES_OF_ALL: f64 = 0.9;
@@ -148,7 +148,7 @@ mod tests {
         assert_eq!(labels([0.9, 21.0]), ["1", "2", "5", "10", "20"]);
         assert_eq!(labels([1e3, 1e7]), ["1000", "10000", "10⁵", "10⁶", "10⁷"]);
         assert_eq!(labels([0.019, 0.06]), ["0.02", "0.03", "0.04", "0.05", "0.06"]);
-        assert_eq!(labels([31.0, 33.0]), ["31.0", "31.5", "32.0", "32.5", "33.0"]);
+        assert_eq!(labels([31.0, 33.0]), ["28", "30", "32", "34", "36"]);
         assert!((2..=9).contains(&labels([1e-200, 1e200]).len()), "{:?}", labels([1e-200, 1e200]));
     }
 

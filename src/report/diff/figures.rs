@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::gate::{Direction, Finding};
 use super::images::join;
-use super::probes;
+use super::storage;
 use crate::config::Config;
 
 /// The method of a render that decides: the others are there to compare it with.
@@ -241,7 +241,7 @@ fn energy(item: &str, reports: [&Value; 2]) -> Finding {
 fn storage(item: &str, reports: [&Value; 2]) -> Vec<Finding> {
     let [a, b] = reports.map(|v| v["config"].as_str().and_then(|text| Config::parse(text, "").ok()));
     let (Some(a), Some(b)) = (a, b) else { return Vec::new() };
-    probes::storage(
+    storage::storage(
         item,
         [a, b].map(|c| (c.encoding.irradiance, c.encoding.border, c.filter.irradiance_resolution as usize)),
     )

@@ -136,7 +136,7 @@ fn albedo_one_percent_up() {
     let (_, base) = rooms();
     let changed = edited(&folder, &scene("two_rooms_open"), "albedo", brighter);
     let fault = make(&folder, "fault", &changed, ROOMS);
-    scene_fault(&folder, base, &fault, "image.mean");
+    scene_fault(&folder, base, &fault, ["image.mean", "irradiance.mean"]);
 }
 
 #[test]
@@ -151,14 +151,14 @@ fn one_light_removed() {
         json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(index));
     };
     let lit = make(&folder, "lit", &edited(&folder, &scene("two_rooms_open"), "bulb", with_bulb), ROOMS);
-    scene_fault(&folder, &lit, &rooms().1, "image.rmse");
+    scene_fault(&folder, &lit, &rooms().1, ["image.rmse", "probes.changed"]);
 }
 
 /// By the gate `scene`; and by the light alone where the scene may change.
-fn scene_fault(folder: &Folder, base: &Made, fault: &Made, gate_of_pictures: &str) {
+fn scene_fault(folder: &Folder, base: &Made, fault: &Made, [pictures, probes]: [&str; 2]) {
     for (a, b, light) in [
-        (&base.run, &fault.run, gate_of_pictures),
-        (&base.probes, &fault.probes, "irradiance.mean"),
+        (&base.run, &fault.run, pictures),
+        (&base.probes, &fault.probes, probes),
         (&base.report, &fault.report, "irradiance.energy"),
     ] {
         caught(folder, a, b, &[], "scene");

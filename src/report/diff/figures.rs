@@ -241,10 +241,7 @@ fn energy(item: &str, reports: [&Value; 2]) -> Finding {
 fn storage(item: &str, reports: [&Value; 2]) -> Vec<Finding> {
     let [a, b] = reports.map(|v| v["config"].as_str().and_then(|text| Config::parse(text, "").ok()));
     let (Some(a), Some(b)) = (a, b) else { return Vec::new() };
-    storage::storage(
-        item,
-        [a, b].map(|c| (c.encoding.irradiance, c.encoding.border, c.filter.irradiance_resolution as usize)),
-    )
+    storage::storage(item, [a, b].map(|c| (c.encoding.irradiance, c.encoding.border, c.filter.irradiance_resolution)))
 }
 
 pub fn bakes(item: &str, base: &Value, candidate: &Value) -> Compared {

@@ -8,11 +8,10 @@ use anyhow::{Context, Result, bail};
 use super::{Console, Outcome, write_json};
 use crate::cli::DiffArgs;
 use crate::output::{self, Named, check_folder, check_outputs, create_folder, write_atomically};
-use crate::report::diff::images::Mask;
+use crate::report::diff::mask::Mask;
 use crate::report::diff::thresholds::Thresholds;
-use crate::report::diff::{
-    Compared, DiffReport, Request, compare, in_unit, junit, margin, markdown, outcome, shell_word,
-};
+use crate::report::diff::words::{in_unit, margin, outcome, shell_word};
+use crate::report::diff::{Compared, DiffReport, Request, compare, junit, markdown};
 use crate::report::format;
 use crate::report::table::{Column, Table};
 

@@ -7,6 +7,9 @@ use crate::common::Folder;
 use crate::made::{diff, text};
 use crate::program::{one_error, run};
 
+/// Twice as much is beyond the thresholds.
+const GIB: u64 = 1 << 30;
+
 fn side(folder: &Folder, name: &str, bytes: u64) -> PathBuf {
     let path = folder.path().join(name);
     fs::create_dir(&path).unwrap();
@@ -24,7 +27,7 @@ fn content(path: &Path) -> String {
 #[test]
 fn the_candidate_takes_the_place_of_the_base() {
     let folder = Folder::new();
-    let (base, candidate) = (side(&folder, "base", 100), side(&folder, "candidate", 1000));
+    let (base, candidate) = (side(&folder, "base", GIB), side(&folder, "candidate", 4 * GIB));
     let other = content(&candidate);
     let before = diff(&folder, &base, &candidate, &[]);
     assert_eq!(before.code, Some(1));
@@ -38,7 +41,8 @@ fn the_candidate_takes_the_place_of_the_base() {
     assert_eq!(names, ["base", "candidate", "out"], "something was left");
     assert_eq!(diff(&folder, &base, &candidate, &[]).code, Some(0));
     // Files likewise.
-    let (a, b) = (folder.write("a.json", content(&base)), folder.write("b.json", content(&base).replace("1000", "1")));
+    let (a, b) =
+        (folder.write("a.json", content(&base)), folder.write("b.json", content(&base).replace("4294967296", "1")));
     assert_eq!(diff(&folder, &a, &b, &["--update-baseline"]).code, Some(0));
     assert_eq!(fs::read(&a).unwrap(), fs::read(&b).unwrap());
 }
@@ -63,7 +67,7 @@ fn what_cannot_be_compared_leaves_the_base_alone() {
 #[test]
 fn a_kill_leaves_the_old_or_the_new_one() {
     let folder = Folder::new();
-    let (base, candidate) = (side(&folder, "base", 100), side(&folder, "candidate", 1000));
+    let (base, candidate) = (side(&folder, "base", GIB), side(&folder, "candidate", 4 * GIB));
     // Enough that the copy takes a while.
     fs::write(candidate.join("large.bin"), vec![7_u8; 20 << 20]).unwrap();
     let (old, new) = (content(&base), content(&candidate));

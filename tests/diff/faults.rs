@@ -60,7 +60,7 @@ fn without_a_fault_everything_passes() {
     let again = make(&folder, "again", &scene("two_rooms_open"), ROOMS);
     passes(&folder, &base.run, &again.run, &[]);
     passes(&folder, &base.probes, &again.probes, &[]);
-    passes(&folder, &base.report, &again.report, &["--thresholds", &no_memory(&folder)]);
+    passes(&folder, &base.report, &again.report, &[]);
 }
 
 #[test]
@@ -71,13 +71,8 @@ fn noise_between_seeds_passes() {
         let other = make(&folder, &format!("s{seed}"), &scene("two_rooms_open"), &format!("{ROOMS} --seed {seed}"));
         passes(&folder, &base.run, &other.run, &[]);
         passes(&folder, &base.probes, &other.probes, &[]);
-        passes(&folder, &base.report, &other.report, &["--thresholds", &no_memory(&folder)]);
+        passes(&folder, &base.report, &other.report, &[]);
     }
-}
-
-/// The peak of memory of tests that run side by side says nothing.
-fn no_memory(folder: &Folder) -> String {
-    folder.write("memory.ron", r#"(gates: {"memory.peak": ()})"#).to_str().unwrap().to_owned()
 }
 
 #[test]
@@ -141,7 +136,7 @@ fn albedo_one_percent_up() {
     let (_, base) = rooms();
     let changed = edited(&folder, &scene("two_rooms_open"), "albedo", brighter);
     let fault = make(&folder, "fault", &changed, ROOMS);
-    scene_fault(&folder, base, &fault);
+    scene_fault(&folder, base, &fault, ["image.mean", "irradiance.mean"]);
 }
 
 #[test]
@@ -156,14 +151,14 @@ fn one_light_removed() {
         json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(index));
     };
     let lit = make(&folder, "lit", &edited(&folder, &scene("two_rooms_open"), "bulb", with_bulb), ROOMS);
-    scene_fault(&folder, &lit, &rooms().1);
+    scene_fault(&folder, &lit, &rooms().1, ["image.rmse", "probes.changed"]);
 }
 
 /// By the gate `scene`; and by the light alone where the scene may change.
-fn scene_fault(folder: &Folder, base: &Made, fault: &Made) {
+fn scene_fault(folder: &Folder, base: &Made, fault: &Made, [pictures, probes]: [&str; 2]) {
     for (a, b, light) in [
-        (&base.run, &fault.run, "image.mean"),
-        (&base.probes, &fault.probes, "irradiance.mean"),
+        (&base.run, &fault.run, pictures),
+        (&base.probes, &fault.probes, probes),
         (&base.report, &fault.report, "irradiance.energy"),
     ] {
         caught(folder, a, b, &[], "scene");

@@ -65,7 +65,7 @@ pub fn edited(folder: &Folder, scene: &Path, name: &str, edit: impl FnOnce(&mut 
 }
 
 /// A copy of a folder in which every picture of a method is changed.
-pub fn with_pictures(folder: &Folder, made: &Path, name: &str, change: impl Fn(u32, u32, &mut Vec<Vec3>)) -> PathBuf {
+pub fn with_pictures(folder: &Folder, made: &Path, name: &str, change: impl Fn(u32, u32, &mut [Vec3])) -> PathBuf {
     let copy = folder.path().join(name);
     std::fs::create_dir(&copy).expect("a folder");
     for file in ["report.json", "visibility_on.exr", "visibility_off.exr"] {
@@ -84,6 +84,6 @@ pub fn with_pictures(folder: &Folder, made: &Path, name: &str, change: impl Fn(u
 }
 
 /// All pixels one to the right, around the edge.
-pub fn shift(width: u32, _height: u32, pixels: &mut Vec<Vec3>) {
+pub fn shift(width: u32, _height: u32, pixels: &mut [Vec3]) {
     pixels.chunks_mut(width as usize).for_each(|row| row.rotate_right(1));
 }

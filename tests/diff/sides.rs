@@ -58,7 +58,8 @@ fn half_broken_inputs() {
     refused(&folder, &folder.path().join("empty"), &folder.path().join("empty"), &["empty", "nothing"]);
     refused(&folder, &good, &folder.path().join("missing.exr"), &["missing.exr", "check the path"]);
     refused(&folder, &good, &old, &["an image", "a report of bake"]);
-    refused(&folder, &good, folder.path(), &["an image"]);
+    let inner = exr(&folder, "several/a.exr", &picture(8, 8, 1.0));
+    refused(&folder, &good, inner.parent().unwrap(), &["an image", "a folder of 1"]);
     let small = exr(&folder, "small.exr", &picture(16, 18, 1.0));
     refused(&folder, &good, &small, &["32 × 18", "16 × 18"]);
     let png = folder.path().join("good.png");

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::gate::{Direction, Finding};
 use super::images::join;
-use super::probes;
+use super::storage;
 use crate::config::Config;
 
 /// The method of a render that decides: the others are there to compare it with.
@@ -111,7 +111,7 @@ const ERROR_RULES: &[Rule] = &[
 const BAKE_RULES: &[Rule] = &[
     rule("bytes_per_probe.runtime_kept", "memory.bytes_per_probe", How::Growth, "%", "Bytes per probe at run time."),
     rule("bytes_per_probe.file", "memory.file_bytes", How::Growth, "%", "Bytes of the file per probe."),
-    rule("peak_memory_bytes", "memory.peak", How::Growth, "%", "Largest memory of the bake."),
+    rule("peak_memory_bytes", "memory.peak", How::Increase, "B", "Largest memory of the bake."),
     rule("time_s.total", "time.bake", How::Growth, "%", "Time of the whole bake."),
     rule("numerics.non_finite", "numerics.non_finite", How::Increase, "", "Values that were not finite."),
     rule("numerics.clamped.irradiance", "numerics.clamped", How::Increase, "", "Values beyond what the format holds."),
@@ -241,10 +241,7 @@ fn energy(item: &str, reports: [&Value; 2]) -> Finding {
 fn storage(item: &str, reports: [&Value; 2]) -> Vec<Finding> {
     let [a, b] = reports.map(|v| v["config"].as_str().and_then(|text| Config::parse(text, "").ok()));
     let (Some(a), Some(b)) = (a, b) else { return Vec::new() };
-    probes::storage(
-        item,
-        [a, b].map(|c| (c.encoding.irradiance, c.encoding.border, c.filter.irradiance_resolution as usize)),
-    )
+    storage::storage(item, [a, b].map(|c| (c.encoding.irradiance, c.encoding.border, c.filter.irradiance_resolution)))
 }
 
 pub fn bakes(item: &str, base: &Value, candidate: &Value) -> Compared {
@@ -275,8 +272,8 @@ pub fn renders(item: &str, base: &Value, candidate: &Value) -> Compared {
     for (key, suffix) in [("error", ""), ("error_gltf", "/gltf")] {
         findings.extend(apply_all(ERROR_RULES, &format!("{name}{suffix}"), [&b[key], &c[key]]));
     }
-    let peaks = [base, candidate].map(|v| number(v, "peak_memory_bytes"));
-    findings.push(Finding::ratio("memory.peak", item, peaks, Direction::Increase, "Largest memory of the render."));
+    let peak = rule("peak_memory_bytes", "memory.peak", How::Increase, "B", "Largest memory of the render.");
+    findings.extend(apply_all(&[peak], item, [base, candidate]));
     findings.extend(storage(item, [base, candidate]));
     Compared { figures: side_by_side(item, base, candidate), findings }
 }

@@ -5,13 +5,14 @@
 
 use std::path::{Path, PathBuf};
 
-use glam::Vec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::DiffError;
-use super::gate::{Direction, Finding};
-use super::ratio::{Part, change};
+use super::gate::Finding;
+use super::image_gates::{SURFACE, findings, surfaces};
+use super::mask::Mask;
+use super::ratio::Part;
 use crate::image::{AnyImage, ImageHeader, Picture, Picture8};
 use crate::math::color::{byte_from_unit, luminance};
 use crate::memory::{TooLittleMemory, available_bytes};
@@ -22,28 +23,8 @@ use crate::report::heatmap::{Heatmap, range_of};
 /// ε of `relmse`, as a share of the base's squared mean: as in the errors of `render`.
 const RELATIVE_FLOOR: f64 = 1.0e-2;
 
-/// Light below this share of the mean does not count as a pixel's own.
-const DARK_SHARE: f64 = 0.05;
-
-/// A pixel has changed when it has by more than this share of its own light.
-const CHANGED_SHARE: f64 = 0.5;
-
 /// The picture is divided into so many blocks along each side for the noise of its mean.
 const BLOCKS: u32 = 8;
-
-/// What the probes that many pixels share do to the noise of a picture's mean, beyond what its blocks show. Without it means of
-/// different seeds lay up to 2.3 of the standard errors apart where probes stood 1 m apart (`two_rooms_open`, `cornell`), but up
-/// to 6 in a room of 2 m probes that is lit through one door.
-const SHARED_PROBES: f64 = 2.0;
-
-/// By how much albedo may differ, and the components of a normal, and depth as a share of itself, before a pixel shows
-/// another surface. Far above rounding, far below a percent of albedo.
-const SAME_ALBEDO: f32 = 1.0e-3;
-const SAME_NORMAL: f32 = 1.0e-2;
-const SAME_DEPTH: f32 = 1.0e-3;
-
-/// Layers that say which surface a pixel shows.
-const SURFACE: [&str; 3] = ["albedo", "normal", "depth"];
 
 /// Layers that are light, in the order of their reports.
 const LIGHT: [&str; 2] = ["beauty", "irradiance_indirect"];
@@ -117,34 +98,6 @@ pub struct Pair<'a> {
     pub exposure_ev: Option<f32>,
     /// White counts.
     pub mask: Option<&'a Mask>,
-}
-
-/// Which pixels count.
-#[derive(Debug, Clone)]
-pub struct Mask {
-    pub path: PathBuf,
-    width: u32,
-    height: u32,
-    counts: Vec<bool>,
-}
-
-impl Mask {
-    /// Reads a picture whose white pixels count: those of at least half the code.
-    pub fn read(path: &Path) -> Result<Mask, DiffError> {
-        let image = AnyImage::read(path, |_| true)?.image;
-        let counts: Vec<bool> = image
-            .layers()
-            .next()
-            .map(|(_, pixels)| pixels.iter().map(|p| luminance(*p) >= 0.5).collect())
-            .unwrap_or_default();
-        if !counts.contains(&true) {
-            return Err(DiffError::Mask {
-                path: path.to_owned(),
-                what: "it has no white pixel; paint white what counts".into(),
-            });
-        }
-        Ok(Mask { path: path.to_owned(), width: image.width, height: image.height, counts })
-    }
 }
 
 /// What the comparison of two files found.
@@ -221,7 +174,7 @@ pub fn compare(pair: &Pair) -> Result<Compared, DiffError> {
 }
 
 /// One layer of one file.
-fn read(path: &Path, layer: &str) -> Result<(Picture, bool), DiffError> {
+pub(super) fn read(path: &Path, layer: &str) -> Result<(Picture, bool), DiffError> {
     let AnyImage { image, is_display } = AnyImage::read(path, |name| name == layer)?;
     let picture = image.picture(layer).unwrap_or_else(|| Picture::new(image.width, image.height));
     Ok((picture, is_display))
@@ -229,13 +182,13 @@ fn read(path: &Path, layer: &str) -> Result<(Picture, bool), DiffError> {
 
 /// Sums of a picture's differences.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    pixels: usize,
+pub(super) struct Sums {
+    pub(super) pixels: usize,
     absolute: f64,
     square: f64,
-    base: f64,
+    pub(super) base: f64,
     luminance: [f64; 2],
-    non_finite: [usize; 2],
+    pub(super) non_finite: [usize; 2],
     worst: Option<(f64, usize)>,
 }
 
@@ -366,93 +319,6 @@ fn flip(base: &Picture, candidate: &Picture, exposure_ev: Option<f32>, used: &[b
     values.par_sort_unstable_by(f32::total_cmp);
     let at = |share: f64| f64::from(values[(share * (values.len() - 1) as f64).round() as usize]);
     Some(FlipFigures { mean, median: at(0.5), p95: at(0.95), p99: at(0.99), max: at(1.0) })
-}
-
-fn findings(
-    item: &str,
-    report: &ImageReport,
-    sums: &Sums,
-    blocks: &[Part],
-    used: &[bool],
-    [base, candidate]: [&Picture; 2],
-) -> Vec<Finding> {
-    let whole = change(blocks).filter(|_| sums.pixels > 0);
-    let means = [report.mean_base, report.mean_candidate];
-    let mean = Finding {
-        value: whole.map(|w| w.percent),
-        ..Finding::ratio("image.mean", item, means, Direction::Both, "Mean luminance over all pixels.")
-    };
-    let base_mean = sums.base / (3.0 * sums.pixels as f64);
-    let rmse = match report.rmse {
-        Some(0.0) => Some(0.0),
-        Some(rmse) if base_mean > 0.0 => Some(100.0 * rmse / base_mean),
-        _ => None,
-    };
-    let floor = DARK_SHARE * base_mean.abs();
-    let is_changed = |i: &usize| {
-        let (b, c) = (base.pixels[*i].as_dvec3(), candidate.pixels[*i].as_dvec3());
-        (c - b).abs().element_sum() > CHANGED_SHARE * (0.5 * (b.abs() + c.abs()).element_sum() + 3.0 * floor)
-    };
-    let changed = (0..used.len()).filter(|i| used[*i]).filter(is_changed).count();
-    let share = (sums.pixels > 0).then(|| 100.0 * changed as f64 / sums.pixels as f64);
-    let non_finite = [sums.non_finite[0] as f64, sums.non_finite[1] as f64].map(Some);
-    let mut findings = vec![
-        Finding::difference(
-            "image.non_finite",
-            item,
-            non_finite,
-            "",
-            Direction::Increase,
-            "Pixels that are NaN or infinite.",
-        ),
-        mean.with_error(whole.and_then(|w| w.standard_error).map(|error| SHARED_PROBES * error)),
-        Finding::percentage(
-            "image.rmse",
-            item,
-            rmse,
-            "Root mean square difference of all channels, as a share of the base's mean.",
-        ),
-        Finding::percentage(
-            "image.changed",
-            item,
-            share,
-            "Share of pixels that changed by more than half of their own light.",
-        ),
-    ];
-    if let Some(flip) = report.flip {
-        let found = Finding::percentage("image.flip", item, Some(flip.mean), "Mean of FLIP: what an observer sees.");
-        findings.push(Finding { unit: "", scale: 1.0, ..found });
-        let found =
-            Finding::percentage("image.flip_p99", item, Some(flip.p99), "FLIP that a hundredth of the pixels exceed.");
-        findings.push(Finding { unit: "", scale: 1.0, ..found });
-    }
-    findings
-}
-
-/// Share of pixels that show another surface: no light and no noise in it.
-fn surfaces(pair: &Pair) -> Result<Finding, DiffError> {
-    let mut differs: Vec<bool> = Vec::new();
-    for layer in SURFACE {
-        let (base, _) = read(&pair.base, layer)?;
-        let (candidate, _) = read(&pair.candidate, layer)?;
-        differs.resize(base.pixels.len(), false);
-        let differ = |b: Vec3, c: Vec3| match layer {
-            "albedo" => (b - c).abs().max_element() > SAME_ALBEDO,
-            "normal" => (b - c).abs().max_element() > SAME_NORMAL,
-            _ => (b.x - c.x).abs() > SAME_DEPTH * b.x.abs(),
-        };
-        let pixels = base.pixels.iter().zip(&candidate.pixels);
-        differs.iter_mut().zip(pixels).for_each(|(d, (b, c))| *d |= differ(*b, *c));
-    }
-    let counts = |i: &usize| pair.mask.is_none_or(|mask| mask.counts[*i]);
-    let counted: Vec<usize> = (0..differs.len()).filter(counts).collect();
-    let share = counted.iter().filter(|i| differs[**i]).count() as f64 / counted.len().max(1) as f64;
-    Ok(Finding::percentage(
-        "image.surface",
-        &pair.item,
-        Some(100.0 * share),
-        "Share of pixels whose albedo, normal or depth differ: they show another surface.",
-    ))
 }
 
 /// Candidate minus base, luminance.

@@ -2,8 +2,9 @@
 
 use quick_junit::{NonSuccessKind, Report, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
+use super::DiffReport;
 use super::gate::Gate;
-use super::{DiffReport, in_unit, outcome};
+use super::words::{in_unit, outcome};
 
 /// The whole document.
 ///

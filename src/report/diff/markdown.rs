@@ -2,8 +2,9 @@
 
 use std::fmt::Write;
 
+use super::DiffReport;
 use super::gate::Gate;
-use super::{DiffReport, in_unit, margin, outcome};
+use super::words::{in_unit, margin, outcome};
 use crate::report::format;
 
 /// GitHub takes comments of 65,536 characters; this leaves room for what a job writes around it.

@@ -171,7 +171,7 @@ fn parse(text: &str, place: &str) -> Result<File, ThresholdsError> {
     crate::config::ron_options().from_str(text).map_err(|e| ThresholdsError::Invalid {
         place: format!("{place}, line {} column {}", e.span.start.line, e.span.start.col),
         what: match e.code {
-            ron::Error::ExpectedNamedStructLike("File") => {
+            ron::Error::ExpectedNamedStructLike("File") if !text.trim().is_empty() => {
                 "the keys stand in parentheses, as in (gates: { \"leak.light\": (absolute: 0.01) })".to_owned()
             }
             _ => messages::of_file(&e, text),

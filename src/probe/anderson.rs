@@ -4,16 +4,16 @@
 //! linear g this is what GMRES does (Walker & Ni, section 2); unlike it, it also serves methods whose queries are not
 //! linear. The same pairs of differences tell the operator's largest eigenvalue by the method of Rayleigh and Ritz.
 //!
-//! Memory: 2·(columns + 1) + 1 fields.
+//! Memory: 2·(columns + 1) + 2 fields.
 
-use glam::{DVec3, Vec3};
-use nalgebra::{Complex, DMatrix, DVector};
+use glam::{BVec3, DVec3, Vec3};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::sweep::Field;
 
-/// Most differences that are kept.
-const WINDOW: usize = 10;
+/// Most differences that are kept: as many as stiff scenes take sweeps.
+const WINDOW: usize = 20;
 /// Fewest: below, acceleration is hardly better than plain iteration.
 const MIN_WINDOW: usize = 3;
 /// Memory that differences may take as far as [`MIN_WINDOW`] allows; a constant, so that no result depends on the machine.
@@ -55,14 +55,6 @@ struct Dots {
     gf: DVec3,
 }
 
-/// An estimate of the spectral radius.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ritz {
-    pub radius: f64,
-    /// ‖T·v − λ·v‖₂ for its vector v, ‖v‖₂ = 1: the smaller, the better the estimate.
-    pub residual: f64,
-}
-
 /// What the iteration remembers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct History {
@@ -73,12 +65,14 @@ pub struct History {
     last: Option<(Field, Field)>,
     /// g(0), where the iteration began from 0.
     origin: Option<Field>,
+    /// The operator applied to 1 everywhere, where that was done.
+    ones: Option<Field>,
 }
 
 impl History {
     /// For fields of so many texels.
     pub fn new(texels: usize) -> History {
-        History { window: History::window(texels as u64), columns: Vec::new(), last: None, origin: None }
+        History { window: History::window(texels as u64), columns: Vec::new(), last: None, origin: None, ones: None }
     }
 
     fn window(texels: u64) -> usize {
@@ -88,7 +82,7 @@ impl History {
 
     /// Most memory for fields of so many texels.
     pub fn bytes(texels: u64) -> u64 {
-        size_of::<Vec3>() as u64 * texels * (2 * (History::window(texels) as u64 + 1) + 1)
+        size_of::<Vec3>() as u64 * texels * (2 * (History::window(texels) as u64 + 1) + 2)
     }
 
     /// Takes an iterate x and g(x) into account.
@@ -123,8 +117,9 @@ impl History {
     }
 
     /// The next iterate: g(x) − Σ γᵢ·ΔGᵢ with the γ that minimise ‖f − Σ γᵢ·ΔFᵢ‖₂, for the channels that `accelerate`;
-    /// g(x) for the others, and in texels that would turn negative. The latter are counted.
-    pub fn next(&self, accelerate: [bool; 3]) -> (Field, u64) {
+    /// g(x) for the others, and where asked to `keep_positive` in texels that would turn negative; these are counted.
+    /// Where g is linear a negative iterate does no harm, and every deviation from the combination does.
+    pub fn next(&self, accelerate: [bool; 3], keep_positive: bool) -> (Field, u64) {
         let Some((f, g)) = &self.last else { return (Field::new(), 0) };
         let right: Vec<DVec3> = self.columns.iter().map(|column| dot(&column.df, f)).collect();
         let per_channel: [Vec<f64>; 3] =
@@ -138,7 +133,7 @@ impl History {
                 .iter()
                 .zip(&weights)
                 .fold(g.as_dvec3(), |sum, (column, weight)| sum - *weight * column.dg[o].as_dvec3());
-            let negative = mixed.cmplt(DVec3::ZERO);
+            let negative = mixed.cmplt(DVec3::ZERO) & BVec3::splat(keep_positive);
             (DVec3::select(negative, g.as_dvec3(), mixed).as_vec3(), u64::from(negative.any()))
         };
         let mixed: Vec<(Vec3, u64)> = g.par_iter().enumerate().map(texel).collect();
@@ -162,26 +157,39 @@ impl History {
     /// Largest absolute Ritz value of the operator over all channels: an estimate of its spectral radius. `None` before
     /// there are two iterates whose difference is not mostly rounding.
     ///
-    /// The differences span little of a slow mode that acceleration has removed early. The iterate itself, which is their
-    /// difference from 0, has most of it: (1 − T)⁻¹ has made the slow modes large in it.
-    ///
-    /// `gap` is a lower bound of the eigenvalue's distance from 1: what rounding could change by more than a little of it
-    /// is left out.
-    pub fn spectral_radius(&self, gap: f64) -> Option<Ritz> {
-        let from_origin = self.origin.as_ref().zip(self.last.as_ref()).map(|(origin, (f, g))| {
-            // At 0 residual and value are the same.
-            let (df, dg) = (difference(f, origin), difference(g, origin));
-            let dots = self.products(&df, &dg);
-            let noise = DVec3::splat(ROUNDING);
-            (dots, noise)
-        });
-        let mut columns: Vec<(&[Dots], DVec3)> = self.columns.iter().map(|c| (&c.dots[..], c.noise)).collect();
-        // With one difference alone it would be this one once more.
-        if let Some((dots, noise)) = from_origin.as_ref().filter(|_| columns.len() > 1) {
-            columns.push((dots, *noise));
-        }
+    /// The operator is far from symmetric, and the differences are of light near lamps: in the space of them all, Ritz
+    /// values say little. What is slow is even. Two vectors are nearly so, the iterate itself, in which (1 − T)⁻¹ has made
+    /// the slow modes large, and 1 everywhere, which in closed rooms of one albedo is the slowest mode.
+    pub fn spectral_radius(&self, gap: f64) -> Option<f64> {
+        let (origin, ones, (f, g)) = (self.origin.as_ref()?, self.ones.as_ref()?, self.last.as_ref()?);
+        let mut pairs = History { columns: Vec::new(), last: None, origin: None, ones: None, window: 2 };
+        let unit = vec![Vec3::ONE; ones.len()];
+        // At 0 residual and value are the same.
+        pairs.add(difference(ones, &unit), ones.clone());
+        pairs.add(difference(f, origin), difference(g, origin));
+        let columns: Vec<(&[Dots], DVec3)> =
+            pairs.columns.iter().map(|c| (&c.dots[..], DVec3::splat(ROUNDING))).collect();
         let of_channel = |c: usize| largest_ritz_value(&columns, c, gap * EIGENVALUE_PRECISION);
-        (0..3).filter_map(of_channel).max_by(|a, b| a.radius.total_cmp(&b.radius))
+        (0..3).filter_map(of_channel).max_by(f64::total_cmp)
+    }
+
+    fn add(&mut self, df: Field, dg: Field) {
+        let dots = self.products(&df, &dg);
+        self.columns.push(Column { df, dg, noise: DVec3::ZERO, dots });
+    }
+
+    /// Takes the operator's image of 1 everywhere into account.
+    pub fn set_image_of_ones(&mut self, image: Field) {
+        self.ones = Some(image);
+    }
+
+    pub fn knows_image_of_ones(&self) -> bool {
+        self.ones.is_some()
+    }
+
+    /// g(0), where the iteration began from 0.
+    pub fn origin(&self) -> Option<&Field> {
+        self.origin.as_ref()
     }
 
     /// Products of columns i and j.
@@ -190,19 +198,26 @@ impl History {
         channel(d, i > j, c)
     }
 
-    /// All fields, for a checkpoint: f and g of the last iterate, then of each column, then g(0) where it is known; with
+    /// All fields, for a checkpoint: f and g of the last iterate, then of each column, then g(0) and T·1 where they are known; with
     /// the columns' noise.
     pub fn fields(&self) -> (Vec<&Field>, Vec<DVec3>) {
         let last = self.last.iter().flat_map(|(f, g)| [f, g]);
         let columns = self.columns.iter().flat_map(|column| [&column.df, &column.dg]);
-        (last.chain(columns).chain(&self.origin).collect(), self.columns.iter().map(|column| column.noise).collect())
+        (
+            last.chain(columns).chain(&self.origin).chain(&self.ones).collect(),
+            self.columns.iter().map(|column| column.noise).collect(),
+        )
     }
 
     /// The inverse of [`History::fields`]; `None` where they do not fit together.
     pub fn from_fields(texels: usize, fields: Vec<Field>, noise: Vec<DVec3>) -> Option<History> {
         let mut history = History::new(texels);
         let pairs = if fields.is_empty() { 0 } else { noise.len() + 1 };
-        if fields.len() / 2 != pairs || pairs > history.window + 1 || fields.iter().any(|f| f.len() != texels) {
+        if fields.len() < 2 * pairs
+            || fields.len() > 2 * pairs + 2
+            || pairs > history.window + 1
+            || fields.iter().any(|f| f.len() != texels)
+        {
             return None;
         }
         let mut fields = fields.into_iter();
@@ -213,6 +228,7 @@ impl History {
             history.columns.push(Column { df, dg, noise, dots });
         }
         history.origin = fields.next();
+        history.ones = fields.next();
         Some(history)
     }
 }
@@ -242,7 +258,7 @@ fn noise(dots: &[Dots], x_square: DVec3) -> DVec3 {
 ///
 /// With ΔX = ΔG − ΔF, T·ΔX = ΔG. In an orthonormal basis W of the ΔX, I − T is −WᵀΔF: its eigenvalues are those of T from
 /// 1, and lose nothing where these are close to 1. Rounding moves them by less than `precision`.
-fn largest_ritz_value(columns: &[(&[Dots], DVec3)], c: usize, precision: f64) -> Option<Ritz> {
+fn largest_ritz_value(columns: &[(&[Dots], DVec3)], c: usize, precision: f64) -> Option<f64> {
     // Normalising directions enlarges rounding: by three at least it may.
     let clean: Vec<usize> = (0..columns.len()).filter(|&i| 3.0 * columns[i].1[c] < precision).collect();
     let n = clean.len();
@@ -263,21 +279,10 @@ fn largest_ritz_value(columns: &[(&[Dots], DVec3)], c: usize, precision: f64) ->
         d.ff - d.gf
     });
     let threshold = (noisiest / precision).powi(2).max(INDEPENDENT);
-    let basis = independent(scaled(xx.clone()), threshold)?;
-    let projected = basis.transpose() * scaled(xf.clone()) * &basis;
-    // The smallest |λ| are of no interest, and complex ones are never the largest of an operator without negative
-    // elements (Perron, Frobenius): where one seems to be, the estimate is not ripe.
+    let basis = independent(scaled(xx), threshold)?;
+    let projected = basis.transpose() * scaled(xf) * &basis;
     let values = projected.complex_eigenvalues();
-    let distance = |mu: &Complex<f64>| (1.0 - mu.re).hypot(mu.im);
-    let mu = values.iter().filter(|mu| mu.re.is_finite()).max_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-    let shifted = &projected - DMatrix::identity(basis.ncols(), basis.ncols()) * mu.re;
-    let svd = shifted.svd(false, true);
-    let vector = svd.v_t.map(|v_t| v_t.row(svd.singular_values.imin()).transpose())?;
-    let weights = (&basis * vector).component_mul(&scale);
-    let ff = DMatrix::from_fn(n, n, |a, b| dots(a, b).ff);
-    let form = |m: &DMatrix<f64>| weights.dot(&(m * &weights));
-    let residual = form(&ff) - 2.0 * mu.re * form(&xf) + mu.re * mu.re * form(&xx);
-    Some(Ritz { radius: distance(mu), residual: residual.max(0.0).sqrt().hypot(mu.im) })
+    values.iter().map(|mu| (1.0 - mu.re).hypot(mu.im)).filter(|l| l.is_finite()).max_by(f64::total_cmp)
 }
 
 /// W with Wᵀ·M·W = 1 for a positive semidefinite M, over its eigenvectors whose eigenvalue exceeds `threshold` of the
@@ -355,7 +360,7 @@ mod tests {
         for _ in 0..6 {
             let g = system.apply(&x);
             history.push(&x, g);
-            x = history.next([true; 3]).0;
+            x = history.next([true; 3], false).0;
         }
         let solution = system.solution();
         let largest = solution.amax();
@@ -366,7 +371,10 @@ mod tests {
             assert!((f64::from(value.y) / 10.0 - solution[i]).abs() / largest < 2e-3);
             assert_eq!(value.z, 0.0, "a channel without light stays dark");
         }
-        let radius = history.spectral_radius(1e-3).unwrap().radius;
+        let ones = vec![Vec3::ONE; 8];
+        let direct = system.apply(&vec![Vec3::ZERO; 8]);
+        history.set_image_of_ones(difference(&system.apply(&ones), &direct));
+        let radius = history.spectral_radius(1e-3).unwrap();
         assert!((radius - 0.999).abs() < 2e-5, "{radius}");
     }
 
@@ -378,7 +386,7 @@ mod tests {
         for _ in 0..3 {
             let g = system.apply(&x);
             history.push(&x, g.clone());
-            let (next, negative) = history.next([true, false, true]);
+            let (next, negative) = history.next([true, false, true], true);
             assert!(next.iter().zip(&g).all(|(n, g)| n.y == g.y));
             assert!(next.iter().all(|n| n.cmpge(Vec3::ZERO).all()));
             assert!(negative <= 4);
@@ -393,7 +401,7 @@ mod tests {
         let mut x = vec![Vec3::ZERO; 4];
         for _ in 0..3 {
             history.push(&x, system.apply(&x));
-            x = history.next([true; 3]).0;
+            x = history.next([true; 3], false).0;
         }
         let (fields, noise) = history.fields();
         let fields: Vec<Field> = fields.into_iter().cloned().collect();
@@ -407,6 +415,6 @@ mod tests {
         assert_eq!(History::window(u64::from(u32::MAX)), MIN_WINDOW);
         let texels = WINDOW_BYTES / 24 / 5;
         assert_eq!(History::window(texels), 5);
-        assert_eq!(History::bytes(texels), texels * 12 * 13);
+        assert_eq!(History::bytes(texels), texels * 12 * 14);
     }
 }

@@ -11,7 +11,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::anderson::{History, Ritz};
+use super::anderson::History;
 use super::sweep::{Captures, Field, Masks, Sweep, field_of, store};
 use super::volume::Volume;
 use crate::math::color::luminance;
@@ -105,16 +105,18 @@ pub struct Solution {
     pub error_bound_relative: Option<f64>,
     /// Channels of sweeps that went on plainly because combining the sweeps before had let the residual rise.
     pub plain_fallbacks: u64,
-    /// Texels of sweeps that went on plainly because the combination was negative there.
+    /// Texels that a combination had left negative, and that a plain sweep went on from as 0 or as they were before.
     pub negative_texels: u64,
+    /// Sweeps beside those of the iteration, to learn the spectral radius.
+    pub probing_sweeps: usize,
     pub non_finite: u64,
+    /// Whether so little is missing that only negative texels keep it from being converged.
+    settled: bool,
     /// Whether sweeps are being combined.
     accelerating: bool,
     /// Sweeps since the residual last halved, and what it then was.
     stalled: u32,
     smallest_residual: Option<f64>,
-    /// Of the estimate of the spectral radius, the best so far; `None` where it is a ratio of changes.
-    ritz_residual: Option<f64>,
     /// 2-norm of the last change.
     last_norm: Option<f64>,
 }
@@ -134,6 +136,8 @@ struct Measured {
     change_norm: f64,
     largest: Vec3,
     energy: f64,
+    /// Texels below 0 after the sweep.
+    negative: u64,
 }
 
 /// Fills the volume's irradiance. Its positions, states and visibility must stand already; after an interruption its
@@ -173,16 +177,28 @@ pub fn solve<C: Captures>(
             let ritz = progress.history.as_ref().and_then(|history| history.spectral_radius(gap));
             solution.judge(&measured, ritz, is_linear, settings);
         }
+        if let Some(history) = progress.history.as_mut().filter(|history| {
+            solution.accelerating && is_linear && !history.knows_image_of_ones() && !solution.converged
+        }) && let Some(image) = image_of_ones(sweep, volume, masks, history.origin())
+        {
+            history.set_image_of_ones(image);
+            solution.probing_sweeps += 1;
+        }
         if solution.converged || index == most {
             progress.history = None;
         }
         let next = match &mut progress.history {
+            // The light itself is nowhere negative: a plain sweep from what is not tells whether that was all.
+            _ if measured.negative > 0 && (solution.settled || index == most) => {
+                solution.negative_texels += measured.negative;
+                g.into_iter().map(|e| e.max(Vec3::ZERO)).collect()
+            }
             Some(history) if solution.accelerating => {
                 solution.plain_fallbacks += rising.iter().filter(|&&r| r).count() as u64;
                 if !is_linear && rising.contains(&true) {
                     history.forget();
                 }
-                let (next, negative) = history.next(rising.map(|r| !r));
+                let (next, negative) = history.next(rising.map(|r| !r), !is_linear);
                 solution.negative_texels += negative;
                 next
             }
@@ -197,6 +213,24 @@ pub fn solve<C: Captures>(
         solution.bounces.iter_mut().for_each(|bounce| bounce.energy += emitted);
     }
     solution
+}
+
+/// T·1, by a sweep of its own, where g(0) is known. Spoils the volume's irradiance.
+fn image_of_ones<C: Captures>(
+    sweep: &Sweep<C>,
+    volume: &mut Volume,
+    masks: Option<&Masks>,
+    origin: Option<&Field>,
+) -> Option<Field> {
+    let origin = origin?;
+    // As large as what is subtracted, so that little is lost in the difference.
+    let scale = origin.iter().copied().fold(Vec3::ZERO, Vec3::max).max_element();
+    if scale <= 0.0 || !scale.is_finite() {
+        return None;
+    }
+    store(volume, &vec![Vec3::splat(scale); origin.len()]);
+    let (g, _) = sweep.apply(volume, masks);
+    Some(g.iter().zip(origin).map(|(g, origin)| (*g - *origin) / scale).collect())
 }
 
 impl Solution {
@@ -215,19 +249,16 @@ impl Solution {
     }
 
     /// What the sweep's change says: how much is still missing, and whether to go on plainly.
-    fn judge(&mut self, measured: &Measured, ritz: Option<Ritz>, is_linear: bool, settings: &SolverSettings) {
+    fn judge(&mut self, measured: &Measured, ritz: Option<f64>, is_linear: bool, settings: &SolverSettings) {
         let change = measured.change.as_dvec3();
         let largest = f64::from(measured.largest.max_element());
         let (change_max, residual) = (change.max_element(), self.bounces.last().map_or(0.0, |b| b.residual));
         let ratio = self.last_norm.filter(|&before| before > 0.0).map(|before| measured.change_norm / before);
         self.last_norm = Some(measured.change_norm);
-        if let Some(ritz) = ritz.filter(|ritz| self.ritz_residual.is_none_or(|best| ritz.residual <= best)) {
-            self.ritz_residual = Some(ritz.residual);
-            self.spectral_radius_estimate = Some(ritz.radius);
-        } else if self.ritz_residual.is_none()
-            && let Some(ratio) = ratio
-        {
-            self.spectral_radius_estimate = Some(ratio);
+        // Every sweep adds a direction to look in. Changes alone tell it only while sweeps are plain.
+        let plain_ratio = ratio.filter(|_| self.spectral_radius_estimate.is_none() || !settings.may_accelerate());
+        if let Some(estimate) = ritz.or(plain_ratio) {
+            self.spectral_radius_estimate = Some(estimate);
         }
         // Of an operator that is not symmetric, Ritz values can lie beyond its eigenvalues, but these not beyond its norm.
         let norm = self.norm_bound().filter(|_| is_linear);
@@ -245,7 +276,8 @@ impl Solution {
         }
         let at_rounding = self.stalled >= 3 && residual <= ROUNDINGS * f64::from(f32::EPSILON);
         self.last_change = Some(change.to_array());
-        self.converged = change_max == 0.0 || missing <= tolerance || at_rounding;
+        self.settled = change_max == 0.0 || missing <= tolerance || at_rounding;
+        self.converged = self.settled && measured.negative == 0;
         if is_linear && let Some(norm) = self.operator_norm {
             // One sweep after x shrinks its error by the norm.
             let bound = |c: usize| if change[c] > 0.0 { change[c] * norm[c] / (1.0 - norm[c]) } else { 0.0 };
@@ -275,12 +307,13 @@ fn missing_sweeps(ratio: f64, missing: f64, tolerance: f64) -> f64 {
 
 /// How much of a field a sweep has changed.
 fn measure(x: &Field, g: &Field) -> Measured {
-    let mut measured = Measured { change: Vec3::ZERO, change_norm: 0.0, largest: Vec3::ZERO, energy: 0.0 };
+    let mut measured = Measured { change: Vec3::ZERO, change_norm: 0.0, largest: Vec3::ZERO, energy: 0.0, negative: 0 };
     for (x, g) in x.iter().zip(g) {
         let change = *g - *x;
         measured.change = measured.change.max(change.abs());
         measured.change_norm += change.as_dvec3().length_squared();
-        measured.largest = measured.largest.max(*g);
+        measured.largest = measured.largest.max(g.abs());
+        measured.negative += u64::from(g.cmplt(Vec3::ZERO).any());
         measured.energy += f64::from(luminance(*g));
     }
     measured.change_norm = measured.change_norm.sqrt();

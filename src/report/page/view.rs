@@ -10,6 +10,7 @@ use super::visible::visible;
 use super::{Figure, FigureTable, Page, PageError, ProbeComparison, Side, codes, histogram};
 use crate::report::colormap::{Colormap, Scale};
 use crate::report::diff::gate::Gate;
+use crate::report::diff::words;
 use crate::report::format;
 use crate::report::heatmap::range_of;
 
@@ -142,7 +143,7 @@ struct CommandView {
 }
 
 impl View {
-    pub fn new(page: &Page<'_>) -> Result<View, PageError> {
+    pub fn new(page: Page<'_>) -> Result<View, PageError> {
         let mut gates: Vec<GateView> = page.gates.iter().map(gate).collect();
         gates.sort_by(|a, b| a.rank.cmp(&b.rank).then_with(|| margin_of(a).total_cmp(&margin_of(b))));
         let failing = gates.iter().filter(|gate| gate.state == "fail").count();
@@ -157,7 +158,7 @@ impl View {
             gates,
             sides: page.sides.iter().zip(["base", "candidate"]).map(|(side, label)| side_view(side, label)).collect(),
             config_lines: config_lines(&page.sides),
-            images: images(&page.images)?,
+            images: images(page.images),
             probes: page.probes.iter().map(probes).collect::<Result<_, _>>()?,
             figures: page.figures.iter().map(table).collect(),
             plots: page.plots.iter().map(plot).collect(),
@@ -177,9 +178,9 @@ impl View {
     }
 }
 
-/// Undefined margins come last among their like.
+/// What fails without a margin is undefined, and first; undefined on both sides is no failure, and last.
 fn margin_of(gate: &GateView) -> f64 {
-    gate.margin.raw.unwrap_or(f64::INFINITY)
+    gate.margin.raw.unwrap_or(if gate.state == "fail" { f64::NEG_INFINITY } else { f64::INFINITY })
 }
 
 fn gate(gate: &Gate) -> GateView {
@@ -200,7 +201,7 @@ fn gate(gate: &Gate) -> GateView {
         candidate: plain(gate.candidate),
         value: Cell { text: with_unit(gate.value, gate.standard_error, gate.unit), raw: finite(gate.value) },
         threshold: Cell { text: threshold(gate), raw: finite(gate.threshold) },
-        margin: cell(margin, format::percent),
+        margin: Cell { text: words::margin(gate), raw: margin },
         bar: 100.0 * margin.unwrap_or(0.0).abs().min(1.0),
         is_beyond: margin.is_some_and(|margin| margin < 0.0),
         source: visible(&gate.source),

@@ -13,8 +13,8 @@ use crate::report::diff::shown::page as page_of;
 use crate::report::diff::thresholds::Thresholds;
 use crate::report::diff::words::{in_unit, margin, outcome, shell_word};
 use crate::report::diff::{Compared, DiffReport, Request, compare, junit, markdown};
-use crate::report::{format, page};
 use crate::report::table::{Column, Table};
+use crate::report::{format, page};
 
 /// Files that the folder gets besides the difference maps.
 const JSON: &str = "diff.json";
@@ -70,7 +70,8 @@ fn check_paths(args: &DiffArgs) -> Result<()> {
         }
     }
     if args.output.is_dir() {
-        let outputs: Vec<Named> = [JSON, MARKDOWN, JUNIT, PAGE].map(|name| Named::new("-o", args.output.join(name))).into();
+        let outputs: Vec<Named> =
+            [JSON, MARKDOWN, JUNIT, PAGE].map(|name| Named::new("-o", args.output.join(name))).into();
         let mut inputs = vec![Named::new("BASE", &args.base), Named::new("CANDIDATE", &args.candidate)];
         inputs.extend(args.thresholds.as_ref().map(|path| Named::new("the thresholds", path)));
         inputs.extend(args.mask.as_ref().map(|path| Named::new("the mask", path)));

@@ -180,7 +180,8 @@ pub fn compare(request: &Request, mut on_item: impl FnMut(&str)) -> Result<Compa
     for (_, base, candidate) in &pairs.both {
         kept = check(base, candidate, request, kept)?;
     }
-    let mut found = Found { shown_pairs: shown_pairs(&pairs), added: pairs.added, missing: pairs.missing, ..Default::default() };
+    let mut found =
+        Found { shown_pairs: shown_pairs(&pairs), added: pairs.added, missing: pairs.missing, ..Default::default() };
     for (name, base, candidate) in &pairs.both {
         on_item(name);
         compare_item(name, base, candidate, request, &mut found)?;

@@ -79,7 +79,10 @@ pub(super) fn check(base: &Item, candidate: &Item, request: &Request, kept: f64)
                 }
             }
             let pairs = pictures("", [a, b], b_report, mask);
-            pairs.iter().filter(|p| p.base.is_file() && p.candidate.is_file()).try_fold(kept, |kept, pair| images::check(pair, kept))
+            pairs
+                .iter()
+                .filter(|p| p.base.is_file() && p.candidate.is_file())
+                .try_fold(kept, |kept, pair| images::check(pair, kept))
         }
         (Item::Image(a), Item::Image(b)) => images::check(&image_pair("", a, b, mask), kept),
         _ => Ok(kept),

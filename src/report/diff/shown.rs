@@ -95,12 +95,14 @@ fn image_figures(report: &ImageReport, unit: &str) -> Vec<Figure> {
         unit: unit.to_owned(),
         ..Figure::default()
     };
+    // Beside the histogram there is no room for the unit in every column.
+    let with_unit = |name: &str| if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") };
     let means = [report.mean_base, report.mean_candidate];
     let finite = [report.non_finite_base, report.non_finite_candidate].map(|count| Some(count as f64));
     let mut figures = vec![
-        of_both("mean luminance", means, unit),
-        of_pair("mae", report.mae, unit),
-        of_pair("rmse", report.rmse, unit),
+        of_both(&with_unit("mean luminance"), means, ""),
+        of_pair(&with_unit("mae"), report.mae, ""),
+        of_pair(&with_unit("rmse"), report.rmse, ""),
         of_pair("relmse", report.relmse, ""),
         of_pair("psnr_db, peak 1", report.psnr_db, "dB"),
     ];
@@ -125,11 +127,8 @@ fn of_both(name: &str, [base, candidate]: [Option<f64>; 2], unit: &str) -> Figur
 }
 
 fn probe_comparison(report: &ProbesReport) -> ProbeComparison {
-    let count = |name: &str, value: usize| Figure {
-        name: name.to_owned(),
-        value: Some(value as f64),
-        ..Figure::default()
-    };
+    let count =
+        |name: &str, value: usize| Figure { name: name.to_owned(), value: Some(value as f64), ..Figure::default() };
     let change = Figure {
         name: "change of mean irradiance".to_owned(),
         value: report.irradiance_change_percent,

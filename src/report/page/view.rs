@@ -20,6 +20,9 @@ const COLORS: usize = 256;
 /// Digits of figures: one more than tables of the terminal, as small differences are what the page is about.
 pub(super) const DIGITS: usize = 4;
 
+/// Larger whole numbers are not counts but bytes and the like.
+const MOST_COUNTED: f64 = 1.0e9;
+
 #[derive(Debug, Serialize)]
 pub struct View {
     title: String,
@@ -190,7 +193,7 @@ fn gate(gate: &Gate) -> GateView {
         (true, false) if gate.threshold.is_none() => ("shown", 3),
         (true, false) => ("pass", 2),
     };
-    let plain = |value: Option<f64>| cell(value, |value| format::significant(value, DIGITS));
+    let plain = |value: Option<f64>| cell(value, number);
     let margin = gate.margin.filter(|margin| margin.is_finite());
     GateView {
         name: visible(&gate.name),
@@ -223,6 +226,15 @@ fn trimmed(number: &str) -> &str {
     if is_fraction { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }
 
+/// A pure number: what is whole is most likely counted, and shown without a fraction.
+fn number(value: f64) -> String {
+    if value.fract() == 0.0 && value.abs() < MOST_COUNTED {
+        format!("{}{}", if value < 0.0 { "-" } else { "" }, format::count(value.abs() as u64))
+    } else {
+        format::significant(value, DIGITS)
+    }
+}
+
 fn finite(value: Option<f64>) -> Option<f64> {
     value.filter(|value| value.is_finite())
 }
@@ -241,6 +253,7 @@ fn with_unit(value: Option<f64>, standard_error: Option<f64>, unit: &str) -> Str
         _ => {
             let number = match standard_error {
                 Some(_) => format::with_error(value, standard_error),
+                None if unit.is_empty() => number(value),
                 None => format::significant(value, DIGITS),
             };
             visible(format!("{number} {unit}").trim_end())
@@ -332,6 +345,9 @@ mod tests {
             (Some(2048.0), "bytes", "2.00 KiB"),
             (Some(-2048.0), "bytes", "-2.00 KiB"),
             (Some(0.5), "%", "0.5000 %"),
+            (Some(300.0), "", "300"),
+            (Some(-2.0), "", "-2"),
+            (Some(0.25), "", "0.2500"),
             (Some(f64::NAN), "", "–"),
             (None, "m", "–"),
         ];

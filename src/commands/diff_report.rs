@@ -9,16 +9,18 @@ use super::{Console, Outcome, write_json};
 use crate::cli::DiffArgs;
 use crate::output::{self, Named, check_folder, check_outputs, create_folder, write_atomically};
 use crate::report::diff::mask::Mask;
+use crate::report::diff::shown::page as page_of;
 use crate::report::diff::thresholds::Thresholds;
 use crate::report::diff::words::{in_unit, margin, outcome, shell_word};
 use crate::report::diff::{Compared, DiffReport, Request, compare, junit, markdown};
-use crate::report::format;
 use crate::report::table::{Column, Table};
+use crate::report::{format, page};
 
 /// Files that the folder gets besides the difference maps.
 const JSON: &str = "diff.json";
 const MARKDOWN: &str = "diff.md";
 const JUNIT: &str = "junit.xml";
+const PAGE: &str = "index.html";
 
 /// Gates that pass and are printed all the same, the closest to their thresholds first.
 const CLOSEST: usize = 10;
@@ -38,9 +40,9 @@ pub fn run(args: &DiffArgs, console: &Console) -> Result<Outcome> {
         mask: mask.as_ref(),
         command: command_line(args),
     };
-    let compared =
+    let mut compared =
         compare(&request, |item| console.say(format!("comparing {}", if item.is_empty() { "the two" } else { item })))?;
-    write(args, &compared)?;
+    write(args, &mut compared)?;
     print(args, console, &compared.report)?;
     if args.update_baseline {
         output::replace(&args.base, &args.candidate)?;
@@ -68,7 +70,8 @@ fn check_paths(args: &DiffArgs) -> Result<()> {
         }
     }
     if args.output.is_dir() {
-        let outputs: Vec<Named> = [JSON, MARKDOWN, JUNIT].map(|name| Named::new("-o", args.output.join(name))).into();
+        let outputs: Vec<Named> =
+            [JSON, MARKDOWN, JUNIT, PAGE].map(|name| Named::new("-o", args.output.join(name))).into();
         let mut inputs = vec![Named::new("BASE", &args.base), Named::new("CANDIDATE", &args.candidate)];
         inputs.extend(args.thresholds.as_ref().map(|path| Named::new("the thresholds", path)));
         inputs.extend(args.mask.as_ref().map(|path| Named::new("the mask", path)));
@@ -94,17 +97,20 @@ fn command_line(args: &DiffArgs) -> String {
     line
 }
 
-fn write(args: &DiffArgs, compared: &Compared) -> Result<()> {
+fn write(args: &DiffArgs, compared: &mut Compared) -> Result<()> {
+    let shown = std::mem::take(&mut compared.shown);
     let report = &compared.report;
     // All texts are made before the first file is written.
     let markdown = markdown::text(report);
     let junit = junit::text(report).context("cannot write the gates as JUnit XML")?;
+    let page = page::render(page_of(report, shown))?;
     create_folder(&args.output)?;
     for (name, picture) in &compared.pictures {
         picture.write_png(&args.output.join(name))?;
     }
     write_atomically(&args.output.join(MARKDOWN), |file| file.write_all(markdown.as_bytes()))?;
     write_atomically(&args.output.join(JUNIT), |file| file.write_all(junit.as_bytes()))?;
+    write_atomically(&args.output.join(PAGE), |file| file.write_all(page.as_bytes()))?;
     // Last: whoever waits for it finds the others there.
     write_json(&args.output.join(JSON), report)
 }

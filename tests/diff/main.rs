@@ -6,6 +6,7 @@ mod common;
 mod faults;
 mod golden;
 mod made;
+mod page;
 #[allow(dead_code)]
 #[path = "../pipeline/probe_file.rs"]
 mod probe_file;

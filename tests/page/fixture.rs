@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use glam::Vec3;
 use lightprobe::report::diff::gate::Gate;
 use lightprobe::report::page::{
-    Command, Figure, FigureTable, Histogram, Page, PageImage, Plot, ProbeComparison, ProbeRow, Side,
+    Command, Figure, FigureTable, Histogram, PackedImage, Page, PageImage, Plot, ProbeComparison, ProbeRow, Side,
 };
 
 /// Breaks out of attributes, elements, scripts and comments, and turns the text after it around.
@@ -38,6 +38,7 @@ fn pair(name: &str, width: u32, height: u32, of: impl Fn(usize, u32, u32) -> Vec
         candidate: side(1),
         exposure_ev: EXPOSURE_EV,
         is_display_referred: false,
+        is_compared: None,
         figures: vec![
             Figure { name: "rmse".to_owned(), value: Some(0.0123), ..Figure::default() },
             Figure { name: "psnr".to_owned(), value: None, unit: "dB".to_owned(), ..Figure::default() },
@@ -119,7 +120,7 @@ pub fn page_of(images: Vec<PageImage<'static>>) -> String {
         title: "two_rooms_open, default against visibility off".to_owned(),
         sides: [side("base", "moments(power: 3, floor: 0.05)"), side("candidate", "none")],
         gates: &gates,
-        images,
+        images: images.iter().map(|image| PackedImage::new(image, images.len()).unwrap()).collect(),
         probes: vec![ProbeComparison {
             name: "two_rooms_open.probes".to_owned(),
             figures: vec![figure("probes", "", 300.0, 300.0), figure("mean irradiance", "W·m⁻²", 1.271, 1.05)],
@@ -155,7 +156,7 @@ pub fn page_of(images: Vec<PageImage<'static>>) -> String {
         ],
         notes: vec!["Same seed and configuration of capture: noise explains nothing.".to_owned()],
     };
-    lightprobe::report::page::render(&page).unwrap()
+    lightprobe::report::page::render(page).unwrap()
 }
 
 /// Three pairs: light with a pixel that is no number, a hostile name, a PNG.

@@ -66,7 +66,7 @@ pub(super) fn conclude(request: &Request, sides: &[Side; 2], mut found: Found) -
         notes,
         commands,
     };
-    Compared { report, pictures }
+    Compared { report, shown: found.shown, pictures }
 }
 
 /// Gives the difference maps names that are safe in any folder.

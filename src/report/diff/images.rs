@@ -13,12 +13,14 @@ use super::gate::Finding;
 use super::image_gates::{SURFACE, findings, surfaces};
 use super::mask::Mask;
 use super::ratio::Part;
+use super::shown;
 use crate::image::{AnyImage, ImageHeader, Picture, Picture8};
 use crate::math::color::{byte_from_unit, luminance};
 use crate::memory::{TooLittleMemory, available_bytes};
 use crate::report::colormap::Scale;
 use crate::report::error::flip::flip_map;
 use crate::report::heatmap::{Heatmap, range_of};
+use crate::report::page::{MOST_PIXELS, PackedImage};
 
 /// ε of `relmse`, as a share of the base's squared mean: as in the errors of `render`.
 const RELATIVE_FLOOR: f64 = 1.0e-2;
@@ -27,10 +29,19 @@ const RELATIVE_FLOOR: f64 = 1.0e-2;
 const BLOCKS: u32 = 8;
 
 /// Layers that are light, in the order of their reports.
-const LIGHT: [&str; 2] = ["beauty", "irradiance_indirect"];
+pub(super) const LIGHT: [&str; 2] = ["beauty", "irradiance_indirect"];
 
 /// Memory at the peak, per pixel, FLIP's own pictures included: 105 B were measured on 7680 × 4320, rounded up.
 const PIXEL_BYTES: f64 = 130.0;
+
+/// Memory, per pixel that the page shows, while it packs a pair: two pictures, planes of both as they are and as differences, bytes
+/// before and after deflation.
+const PACKING_BYTES: f64 = 60.0;
+
+/// What is kept of a pair until the files are written: its difference map per pixel, and per pixel that the page shows its text at
+/// all resolutions, 1 B where light is smooth and up to 10 B where every channel has noise of its own.
+const MAP_BYTES: f64 = 3.0;
+const PACKED_BYTES: f64 = 10.0;
 
 /// The pixel that differs most.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -105,12 +116,14 @@ pub struct Pair<'a> {
 pub struct Compared {
     pub reports: Vec<ImageReport>,
     pub findings: Vec<Finding>,
-    /// In the order of `reports`.
+    /// In the order of `reports`, as is what the page shows.
     pub maps: Vec<Option<Picture8>>,
+    pub shown: Vec<PackedImage>,
 }
 
-/// Refuses pictures that cannot be compared, by their headers.
-pub fn check(pair: &Pair) -> Result<(), DiffError> {
+/// Refuses pictures that cannot be compared, by their headers. `kept`: bytes that pairs before this one leave in memory; returned
+/// with this one's added.
+pub fn check(pair: &Pair, kept: f64) -> Result<f64, DiffError> {
     let headers = [ImageHeader::read(&pair.base)?, ImageHeader::read(&pair.candidate)?];
     let [base, candidate] = &headers;
     let incomparable =
@@ -137,7 +150,11 @@ pub fn check(pair: &Pair) -> Result<(), DiffError> {
         );
         return Err(DiffError::Mask { path: mask.path.clone(), what });
     }
-    let needed = (f64::from(base.width) * f64::from(base.height) * PIXEL_BYTES) as u64;
+    let pixels = f64::from(base.width) * f64::from(base.height);
+    let shown = pixels.min(MOST_PIXELS as f64);
+    let layers = lights(&base.layers).len() as f64;
+    let kept = kept + layers * (MAP_BYTES * pixels + PACKED_BYTES * shown);
+    let needed = (kept + PIXEL_BYTES * pixels + PACKING_BYTES * shown) as u64;
     match available_bytes() {
         Some(available) if needed > available => Err(TooLittleMemory {
             key: pair.base.display().to_string(),
@@ -147,25 +164,27 @@ pub fn check(pair: &Pair) -> Result<(), DiffError> {
             remedy: "compare smaller pictures",
         }
         .into()),
-        _ => Ok(()),
+        _ => Ok(kept),
     }
 }
 
-/// Compares two files, layer by layer: one layer of both is in memory at a time.
-pub fn compare(pair: &Pair) -> Result<Compared, DiffError> {
+/// Layers that are compared: those of light, or the first.
+fn lights(layers: &[String]) -> Vec<&str> {
+    let lights: Vec<&str> = LIGHT.into_iter().filter(|l| layers.iter().any(|n| n == l)).collect();
+    if lights.is_empty() { layers.iter().take(1).map(String::as_str).collect() } else { lights }
+}
+
+/// Compares two files, layer by layer: one layer of both is in memory at a time. `pairs`: about how many the page shows.
+pub fn compare(pair: &Pair, pairs: usize) -> Result<Compared, DiffError> {
     let layers = ImageHeader::read(&pair.base)?.layers;
     let others = ImageHeader::read(&pair.candidate)?.layers;
     let mut compared = Compared::default();
-    let mut lights: Vec<&str> = LIGHT.into_iter().filter(|l| layers.iter().any(|n| n == l)).collect();
-    if lights.is_empty() {
-        lights = layers.iter().take(1).map(String::as_str).collect();
-    }
-    for layer in &lights {
+    for layer in lights(&layers) {
         if !others.iter().any(|o| o == layer) {
             let what = format!("the second has no layer {layer}; render both with one version");
             return Err(DiffError::Incomparable { base: pair.base.clone(), candidate: pair.candidate.clone(), what });
         }
-        compare_layer(pair, layer, layers.len() > 1, &mut compared)?;
+        compare_layer(pair, (layer, layers.len() > 1), pairs, &mut compared)?;
     }
     if SURFACE.iter().all(|s| layers.iter().any(|l| l == s) && others.iter().any(|l| l == s)) && pair.judged {
         compared.findings.push(surfaces(pair)?);
@@ -192,7 +211,12 @@ pub(super) struct Sums {
     worst: Option<(f64, usize)>,
 }
 
-fn compare_layer(pair: &Pair, layer: &str, is_named: bool, compared: &mut Compared) -> Result<(), DiffError> {
+fn compare_layer(
+    pair: &Pair,
+    (layer, is_named): (&str, bool),
+    pairs: usize,
+    compared: &mut Compared,
+) -> Result<(), DiffError> {
     let (base, is_display) = read(&pair.base, layer)?;
     let (candidate, _) = read(&pair.candidate, layer)?;
     let counts = |i: usize| pair.mask.is_none_or(|mask| mask.counts[i]);
@@ -235,6 +259,7 @@ fn compare_layer(pair: &Pair, layer: &str, is_named: bool, compared: &mut Compar
         "beauty" => "W·m⁻²·sr⁻¹",
         _ => "W·m⁻²",
     };
+    compared.shown.push(shown::image(&report, unit, &used, [&base, &candidate], pairs)?);
     compared.maps.push(Some(difference_map((&item, unit), &base, &candidate, &used)));
     compared.reports.push(report);
     Ok(())

@@ -1,7 +1,7 @@
 //! Two results compared: figures, gates, verdict.
 //!
 //! [`sides`] finds what there is, [`probes`], [`images`] and [`figures`] compare it and make findings, [`thresholds`] judges
-//! these into [`gate`]s, and [`markdown`] and [`junit`] tell of them. Nothing is written here.
+//! these into [`gate`]s, and [`markdown`], [`junit`] and [`shown`] tell of them. Nothing is written here.
 
 mod conclude;
 pub mod config_changes;
@@ -15,8 +15,10 @@ pub mod mask;
 mod pairs;
 pub mod probes;
 pub mod ratio;
+pub mod shown;
 pub mod sides;
 pub mod storage;
+mod sweep_plot;
 pub mod thresholds;
 pub mod words;
 
@@ -31,14 +33,16 @@ use self::figures::Figure;
 use self::gate::{Finding, Gate};
 use self::images::ImageReport;
 use self::mask::Mask;
-use self::pairs::{check, image_pair, pair_up, pictures};
+use self::pairs::{check, image_pair, pair_up, pictures, shown_pairs};
 use self::probes::ProbesReport;
+use self::shown::Shown;
 use self::sides::{Item, Side};
 use self::thresholds::Thresholds;
 use self::words::shell_word;
 use crate::image::{ImageError, Picture8};
 use crate::memory::TooLittleMemory;
 use crate::probe::container::FileError;
+use crate::report::page::PageError;
 
 /// Version of the report's layout.
 pub const SCHEMA: &str = "lightprobe-diff/1";
@@ -66,6 +70,8 @@ pub enum DiffError {
     Image(#[from] ImageError),
     #[error(transparent)]
     Probes(#[from] FileError),
+    #[error(transparent)]
+    Page(#[from] PageError),
     #[error(transparent)]
     Memory(#[from] TooLittleMemory),
 }
@@ -121,6 +127,7 @@ pub struct DiffReport {
 #[derive(Debug)]
 pub struct Compared {
     pub report: DiffReport,
+    pub shown: Shown,
     pub pictures: Vec<(String, Picture8)>,
 }
 
@@ -142,6 +149,9 @@ struct Found {
     findings: Vec<Finding>,
     images: Vec<ImageReport>,
     maps: Vec<Option<Picture8>>,
+    shown: Shown,
+    /// About how many pairs of pictures the page shows.
+    shown_pairs: usize,
     probes: Vec<ProbesReport>,
     figures: Vec<Figure>,
     added: Vec<String>,
@@ -166,10 +176,12 @@ pub fn compare(request: &Request, mut on_item: impl FnMut(&str)) -> Result<Compa
     let sides = [Side::open(request.base)?, Side::open(request.candidate)?];
     let pairs = pair_up(&sides)?;
     // All that headers and reports tell is said before the work.
+    let mut kept = 0.0;
     for (_, base, candidate) in &pairs.both {
-        check(base, candidate, request)?;
+        kept = check(base, candidate, request, kept)?;
     }
-    let mut found = Found { added: pairs.added, missing: pairs.missing, ..Default::default() };
+    let mut found =
+        Found { shown_pairs: shown_pairs(&pairs), added: pairs.added, missing: pairs.missing, ..Default::default() };
     for (name, base, candidate) in &pairs.both {
         on_item(name);
         compare_item(name, base, candidate, request, &mut found)?;
@@ -192,7 +204,7 @@ fn compare_item(
             found.take_figures(figures::renders(name, b_report, c_report));
             for pair in pictures(name, [a, b], b_report, request.mask) {
                 match (pair.base.is_file(), pair.candidate.is_file()) {
-                    (true, true) => found.take_images(images::compare(&pair)?),
+                    (true, true) => found.take_images(images::compare(&pair, found.shown_pairs)?),
                     (true, false) if pair.judged => found.missing.push(pair.item),
                     (false, true) if pair.judged => found.added.push(pair.item),
                     // A baseline need not keep what does not decide.
@@ -207,6 +219,7 @@ fn compare_item(
             found.take_figures(compared);
             found.missing.extend(missing);
             found.added.extend(added);
+            found.shown.plots.extend(sweep_plot::plot(name, a, b));
         }
         (Item::Probes(a), Item::Probes(b)) => {
             let (report, findings, files) = probes::compare(name, a, b)?;
@@ -219,7 +232,10 @@ fn compare_item(
                 found.about[side].scene.get_or_insert_with(|| file.scene.blake3.clone());
             }
         }
-        (Item::Image(a), Item::Image(b)) => found.take_images(images::compare(&image_pair(name, a, b, request.mask))?),
+        (Item::Image(a), Item::Image(b)) => {
+            let pair = image_pair(name, a, b, request.mask);
+            found.take_images(images::compare(&pair, found.shown_pairs)?);
+        }
         // Kinds were compared when the items were paired.
         _ => {}
     }
@@ -253,5 +269,6 @@ impl Found {
         self.findings.extend(compared.findings);
         self.images.extend(compared.reports);
         self.maps.extend(compared.maps);
+        self.shown.images.extend(compared.shown);
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::images::{self, Pair, join};
+use super::images::{self, LIGHT, Pair, join};
 use super::mask::Mask;
 use super::sides::{Item, RENDER_PICTURES, Side};
 use super::{DiffError, Request, figures};
@@ -66,8 +66,8 @@ pub(super) fn pictures<'m>(
     RENDER_PICTURES.iter().map(pair).collect()
 }
 
-/// Refuses what cannot be compared, before anything is.
-pub(super) fn check(base: &Item, candidate: &Item, request: &Request) -> Result<(), DiffError> {
+/// Refuses what cannot be compared, before anything is. `kept`: see [`images::check`].
+pub(super) fn check(base: &Item, candidate: &Item, request: &Request, kept: f64) -> Result<f64, DiffError> {
     let mask = request.mask;
     match (base, candidate) {
         (Item::Render { folder: a, report: b_report }, Item::Render { folder: b, report: c_report }) => {
@@ -79,10 +79,13 @@ pub(super) fn check(base: &Item, candidate: &Item, request: &Request) -> Result<
                 }
             }
             let pairs = pictures("", [a, b], b_report, mask);
-            pairs.iter().filter(|p| p.base.is_file() && p.candidate.is_file()).try_for_each(images::check)
+            pairs
+                .iter()
+                .filter(|p| p.base.is_file() && p.candidate.is_file())
+                .try_fold(kept, |kept, pair| images::check(pair, kept))
         }
-        (Item::Image(a), Item::Image(b)) => images::check(&image_pair("", a, b, mask)),
-        _ => Ok(()),
+        (Item::Image(a), Item::Image(b)) => images::check(&image_pair("", a, b, mask), kept),
+        _ => Ok(kept),
     }
 }
 
@@ -95,4 +98,17 @@ pub(super) fn image_pair<'m>(name: &str, base: &Path, candidate: &Path, mask: Op
         exposure_ev: None,
         mask,
     }
+}
+
+/// How many pairs of pictures the page shows, at most: two layers of a render's pictures, one of an image.
+pub(super) fn shown_pairs(pairs: &Pairs) -> usize {
+    let of_item = |(_, base, candidate): &(&str, &Item, &Item)| match (base, candidate) {
+        (Item::Render { folder: a, report }, Item::Render { folder: b, .. }) => {
+            let both = pictures("", [a, b], report, None);
+            LIGHT.len() * both.iter().filter(|p| p.base.is_file() && p.candidate.is_file()).count()
+        }
+        (Item::Image(_), Item::Image(_)) => 1,
+        _ => 0,
+    };
+    pairs.both.iter().map(of_item).sum()
 }

@@ -100,6 +100,9 @@ pub struct ProbesReport {
     /// Of every compared probe, percent of the base's: for histograms.
     #[serde(skip)]
     pub changes_percent: Vec<f32>,
+    /// Likewise `distance_difference_m`; empty without distances.
+    #[serde(skip)]
+    pub distance_differences_m: Vec<f32>,
 }
 
 /// A region of the volume whose mean changed.
@@ -221,6 +224,7 @@ fn compare_files(item: &str, base_file: &ProbeFile, candidate_file: &ProbeFile) 
     findings.extend(distances(item, base, &rows));
     rows.sort_by(|a, b| b.irradiance_difference_relative.total_cmp(&a.irradiance_difference_relative));
     let compared = rows.len();
+    let distance_differences_m = rows.iter().filter_map(|r| r.distance_difference_m).map(|d| d as f32).collect();
     rows.truncate(WORST);
     let report = ProbesReport {
         item: item.to_owned(),
@@ -239,6 +243,7 @@ fn compare_files(item: &str, base_file: &ProbeFile, candidate_file: &ProbeFile) 
         irradiance_rms_percent: rms,
         worst: rows,
         changes_percent,
+        distance_differences_m,
     };
     (report, findings)
 }

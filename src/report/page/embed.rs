@@ -15,7 +15,7 @@ use super::shrink::{Size, mean_of_blocks, peak_of_blocks};
 use crate::math::color::luminance;
 
 /// Most pixels that a browser is asked to hold of one picture: 2560 × 1440 fits.
-const MOST_PIXELS: usize = 1 << 22;
+pub const MOST_PIXELS: usize = 1 << 22;
 
 /// A pair of pictures, packed.
 #[derive(Debug, Clone)]
@@ -33,13 +33,12 @@ pub struct Embedded {
 }
 
 impl Embedded {
-    /// Packs a pair with blocks of `factor` × `factor` pixels as one, or larger ones where the picture is too large for a browser.
+    /// Packs a pair with blocks of `factor` × `factor` pixels as one.
     ///
     /// # Errors
     /// Those of [`pack`].
     pub fn new(image: &PageImage<'_>, difference: &[f32], range: f32, factor: u32) -> io::Result<Embedded> {
         let whole = image.size();
-        let factor = factor.max(least_factor(whole));
         let size = whole.shrunk(factor);
         let scale = difference_scale(f64::from(range));
         let planes = |pixels: &[Vec3]| planes_of(&mean_of_blocks(pixels, whole, factor), image.is_display_referred);
@@ -69,10 +68,13 @@ impl Embedded {
     }
 }
 
-/// The signed difference that heat map and histogram show: luminance of candidate − base.
+/// The signed difference that heat map and histogram show: luminance of candidate − base; not a number where none is compared.
 pub fn differences(image: &PageImage<'_>) -> Vec<f32> {
-    let difference = |(base, candidate): (&Vec3, &Vec3)| luminance(*candidate - *base);
-    image.base.par_iter().zip(&image.candidate[..]).map(difference).collect()
+    let difference = |(i, (base, candidate)): (usize, (&Vec3, &Vec3))| match image.is_compared {
+        Some(is_compared) if !is_compared[i] => f32::NAN,
+        _ => luminance(*candidate - *base),
+    };
+    image.base.par_iter().zip(&image.candidate[..]).enumerate().map(difference).collect()
 }
 
 /// The codes of a picture in three planes.
@@ -93,8 +95,8 @@ fn relative(planes: &[Vec<i16>], from: &[Vec<i16>]) -> Vec<Vec<i16>> {
     planes.iter().zip(from).map(minus).collect()
 }
 
-/// The smallest power of two that leaves few enough pixels.
-fn least_factor(size: Size) -> u32 {
+/// The smallest power of two that leaves few enough pixels for a browser.
+pub fn finest_factor(size: Size) -> u32 {
     let mut factor = 1;
     while size.shrunk(factor).pixels() > MOST_PIXELS {
         factor *= 2;
@@ -158,6 +160,7 @@ pub(super) mod tests {
             candidate: Cow::Owned(candidate),
             exposure_ev: 0.5,
             is_display_referred: false,
+            is_compared: None,
             figures: Vec::new(),
             worst_pixel: Some([3, 4]),
         }
@@ -208,8 +211,8 @@ pub(super) mod tests {
 
     #[test]
     fn too_large_a_picture_is_shrunk() {
-        assert_eq!(least_factor(Size { width: 1920, height: 1080 }), 1);
-        assert_eq!(least_factor(Size { width: 7680, height: 4320 }), 4);
+        assert_eq!(finest_factor(Size { width: 1920, height: 1080 }), 1);
+        assert_eq!(finest_factor(Size { width: 7680, height: 4320 }), 4);
         let image = pair(9, 7);
         let embedded = Embedded::new(&image, &differences(&image), 1.0, 2).unwrap();
         assert_eq!((embedded.factor, embedded.size), (2, Size { width: 5, height: 4 }));

@@ -1,9 +1,8 @@
 //! What the template gets of the pairs of pictures.
 
-use rayon::prelude::*;
 use serde::Serialize;
 
-use super::embed::{Embedded, differences};
+use super::embed::{Embedded, differences, finest_factor};
 use super::shrink::Size;
 use super::view::{DIGITS, FigureView, figures};
 use super::visible::visible;
@@ -46,44 +45,44 @@ struct EmbeddedView {
     difference: String,
 }
 
-/// A picture's parts that do not depend on how much room there is.
-struct Prepared {
-    difference: Vec<f32>,
-    colormap: Colormap,
-    range: f32,
+/// A pair of pictures, ready for the page: its pixels are needed no more, so that pages of many large pictures can be made one
+/// after the other.
+#[derive(Debug)]
+pub struct PackedImage {
+    view: ImageView,
+    /// Finest resolution first.
+    levels: Vec<Embedded>,
 }
 
-/// All pairs, checked and packed into the room that a page has.
-///
-/// # Errors
-/// Pictures whose pixels do not match their size.
-pub fn images(images: &[PageImage<'_>]) -> Result<Vec<ImageView>, PageError> {
-    for image in images {
+impl PackedImage {
+    /// Packs one of about `pairs` pairs.
+    ///
+    /// # Errors
+    /// Pictures whose pixels do not match their size.
+    pub fn new(image: &PageImage<'_>, pairs: usize) -> Result<PackedImage, PageError> {
         let (base, candidate) = (image.base.len(), image.candidate.len());
-        if base != image.size().pixels() || candidate != base || base == 0 {
+        let is_mask_right = image.is_compared.is_none_or(|is_compared| is_compared.len() == base);
+        if base != image.size().pixels() || candidate != base || base == 0 || !is_mask_right {
             let (name, width, height) = (visible(&image.name), image.width, image.height);
             return Err(PageError::Size { name, width, height, base, candidate });
         }
-    }
-    let prepare = |image: &PageImage<'_>| {
         let difference = differences(image);
         let colormap = Colormap::new(Scale::Diverging, range_of(&difference, Scale::Diverging));
-        let range = colormap.range()[1];
-        Prepared { difference, colormap, range }
-    };
-    let prepared: Vec<Prepared> = images.iter().map(prepare).collect();
-    let mut views = images
-        .par_iter()
-        .zip(&prepared)
-        .map(|(image, prepared)| view(image, prepared, still::width_for(images.len())))
-        .collect::<Result<Vec<_>, _>>()?;
+        let view = view(image, &difference, colormap, still::width_for(pairs))?;
+        let embed = |factor| Embedded::new(image, &difference, colormap.range()[1], factor);
+        let levels = budget::factors(finest_factor(image.size())).map(embed).collect::<Result<_, _>>()?;
+        Ok(PackedImage { view, levels })
+    }
+}
+
+/// All pairs, in the room that a page has.
+pub fn images(images: Vec<PackedImage>) -> Vec<ImageView> {
+    let (mut views, levels): (Vec<ImageView>, Vec<Vec<Embedded>>) =
+        images.into_iter().map(|image| (image.view, image.levels)).unzip();
     let stills =
         |view: &ImageView| view.base.len() + view.candidate.len() + view.difference.len() + 2 * view.legend.len();
     let room = budget::PICTURES_BYTES.saturating_sub(views.iter().map(stills).sum());
-    let embedded = budget::fit(images.len(), room, |i, factor| {
-        Embedded::new(&images[i], &prepared[i].difference, prepared[i].range, factor)
-    })?;
-    for (view, embedded) in views.iter_mut().zip(embedded) {
+    for (view, embedded) in views.iter_mut().zip(budget::fit(levels, room)) {
         view.embedded = embedded.map(|embedded| {
             let Embedded {
                 factor,
@@ -97,11 +96,11 @@ pub fn images(images: &[PageImage<'_>]) -> Result<Vec<ImageView>, PageError> {
             EmbeddedView { factor, width, height, scale, is_candidate_relative, base, candidate, difference }
         });
     }
-    Ok(views)
+    views
 }
 
-fn view(image: &PageImage<'_>, prepared: &Prepared, width: u32) -> Result<ImageView, PageError> {
-    let Prepared { difference, colormap, range } = prepared;
+fn view(image: &PageImage<'_>, difference: &[f32], colormap: Colormap, width: u32) -> Result<ImageView, PageError> {
+    let range = colormap.range()[1];
     let non_finite = |pixels: &[glam::Vec3]| pixels.iter().filter(|pixel| !pixel.is_finite()).count() as u64;
     let unit = visible(&image.unit);
     Ok(ImageView {
@@ -113,14 +112,14 @@ fn view(image: &PageImage<'_>, prepared: &Prepared, width: u32) -> Result<ImageV
         is_display_referred: image.is_display_referred,
         worst: image.worst_pixel,
         non_finite: [non_finite(&image.base), non_finite(&image.candidate)],
-        range: *range,
-        range_text: format!("{} {unit}", format::significant(f64::from(*range), DIGITS)).trim_end().to_owned(),
+        range,
+        range_text: format!("{} {unit}", format::significant(f64::from(range), DIGITS)).trim_end().to_owned(),
         embedded: None,
         base: still::side(image, &image.base, width)?,
         candidate: still::side(image, &image.candidate, width)?,
-        difference: still::heatmap(difference, image.size(), *colormap, width)?,
-        legend: still::legend(difference, *colormap, &unit)?,
-        histogram: histogram::draw(difference, f64::from(*range), &unit, "pixels").map_err(PageError::Draw)?,
+        difference: still::heatmap(difference, image.size(), colormap, width)?,
+        legend: still::legend(difference, colormap, &unit)?,
+        histogram: histogram::draw(difference, f64::from(range), &unit, "pixels").map_err(PageError::Draw)?,
         figures: figures(&image.figures),
         unit,
     })

@@ -26,9 +26,11 @@ use super::diff::gate::Gate;
 use shrink::Size;
 
 pub use codes::{code_of_radiance, radiance_of_code};
+pub use embed::MOST_PIXELS;
+pub use images::PackedImage;
 
 /// What the page shows.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Page<'a> {
     pub title: String,
     /// Base, candidate.
@@ -36,7 +38,7 @@ pub struct Page<'a> {
     /// In any order.
     pub gates: &'a [Gate],
     /// In order of importance: where the page would become too large, the last ones lose pixels first.
-    pub images: Vec<PageImage<'a>>,
+    pub images: Vec<PackedImage>,
     /// One for each pair of probe files.
     pub probes: Vec<ProbeComparison>,
     pub figures: Vec<FigureTable>,
@@ -79,6 +81,8 @@ pub struct PageImage<'a> {
     pub exposure_ev: f32,
     /// A PNG: it is shown as it is, without exposure.
     pub is_display_referred: bool,
+    /// Which pixels are compared; `None`: all.
+    pub is_compared: Option<&'a [bool]>,
     pub figures: Vec<Figure>,
     /// Column, row.
     pub worst_pixel: Option<[u32; 2]>,
@@ -126,9 +130,9 @@ pub struct ProbeRow {
     pub index: u64,
     /// World space, m.
     pub position_m: [f64; 3],
-    /// Relative difference of mean irradiance, a share.
+    /// Difference of irradiance ÷ its own, a share.
     pub irradiance: Option<f64>,
-    /// Largest difference of mean distance, m.
+    /// Root mean square difference of the stored distances, m.
     pub distance_m: Option<f64>,
     /// "active", "inside geometry" and so on.
     pub base_state: String,
@@ -190,8 +194,8 @@ const NO_NONCE: &str = "0";
 /// The page as HTML.
 ///
 /// # Errors
-/// Pictures whose pixels do not match their size.
-pub fn render(page: &Page<'_>) -> Result<String, PageError> {
+/// None in practice: the templates are part of the program.
+pub fn render(page: Page<'_>) -> Result<String, PageError> {
     let mut environment = Environment::new();
     // The name's ending turns escaping on.
     environment.add_template("macros.html", MACROS)?;
@@ -261,7 +265,7 @@ mod tests {
             title: text.clone(),
             sides: [side, other],
             gates: &gates,
-            images: vec![image],
+            images: vec![PackedImage::new(&image, 1).unwrap()],
             probes: vec![ProbeComparison {
                 name: text.clone(),
                 figures: vec![figure.clone()],
@@ -275,7 +279,7 @@ mod tests {
             commands: vec![Command { purpose: text.clone(), line: text.clone() }],
             notes: vec![text],
         };
-        render(&page).unwrap()
+        render(page).unwrap()
     }
 
     #[test]
@@ -329,22 +333,8 @@ mod tests {
 
     #[test]
     fn pixels_must_match_their_size() {
-        let side = || Side::default();
         let mut image = pair(24, 16);
         image.width = 25;
-        let page = Page {
-            title: String::new(),
-            sides: [side(), side()],
-            gates: &[],
-            images: vec![image],
-            probes: Vec::new(),
-            figures: Vec::new(),
-            plots: Vec::new(),
-            added: Vec::new(),
-            missing: Vec::new(),
-            commands: Vec::new(),
-            notes: Vec::new(),
-        };
-        assert!(matches!(render(&page), Err(PageError::Size { width: 25, .. })));
+        assert!(matches!(PackedImage::new(&image, 1), Err(PageError::Size { width: 25, .. })));
     }
 }

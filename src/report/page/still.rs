@@ -71,7 +71,7 @@ pub fn legend(values: &[f32], colormap: Colormap, unit: &str) -> io::Result<Stri
         title: "candidate − base",
         unit,
         colormap,
-        missing: values.iter().any(|value| !value.is_finite()).then_some("no number"),
+        missing: values.iter().any(|value| !value.is_finite()).then_some("not compared"),
         beyond: [values.iter().any(|&value| value < low), values.iter().any(|&value| value > high)],
     };
     let mut picture = Picture8::filled(LEGEND_WIDTH * LEGEND_ZOOM, legend::HEIGHT * LEGEND_ZOOM, MISSING);

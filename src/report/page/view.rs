@@ -10,6 +10,7 @@ use super::visible::visible;
 use super::{Figure, FigureTable, Page, PageError, ProbeComparison, Side, codes, histogram};
 use crate::report::colormap::{Colormap, Scale};
 use crate::report::diff::gate::Gate;
+use crate::report::diff::words;
 use crate::report::format;
 use crate::report::heatmap::range_of;
 
@@ -18,6 +19,9 @@ const COLORS: usize = 256;
 
 /// Digits of figures: one more than tables of the terminal, as small differences are what the page is about.
 pub(super) const DIGITS: usize = 4;
+
+/// Larger whole numbers are not counts but bytes and the like.
+const MOST_COUNTED: f64 = 1.0e9;
 
 #[derive(Debug, Serialize)]
 pub struct View {
@@ -142,7 +146,7 @@ struct CommandView {
 }
 
 impl View {
-    pub fn new(page: &Page<'_>) -> Result<View, PageError> {
+    pub fn new(page: Page<'_>) -> Result<View, PageError> {
         let mut gates: Vec<GateView> = page.gates.iter().map(gate).collect();
         gates.sort_by(|a, b| a.rank.cmp(&b.rank).then_with(|| margin_of(a).total_cmp(&margin_of(b))));
         let failing = gates.iter().filter(|gate| gate.state == "fail").count();
@@ -157,7 +161,7 @@ impl View {
             gates,
             sides: page.sides.iter().zip(["base", "candidate"]).map(|(side, label)| side_view(side, label)).collect(),
             config_lines: config_lines(&page.sides),
-            images: images(&page.images)?,
+            images: images(page.images),
             probes: page.probes.iter().map(probes).collect::<Result<_, _>>()?,
             figures: page.figures.iter().map(table).collect(),
             plots: page.plots.iter().map(plot).collect(),
@@ -177,9 +181,9 @@ impl View {
     }
 }
 
-/// Undefined margins come last among their like.
+/// What fails without a margin is undefined, and first; undefined on both sides is no failure, and last.
 fn margin_of(gate: &GateView) -> f64 {
-    gate.margin.raw.unwrap_or(f64::INFINITY)
+    gate.margin.raw.unwrap_or(if gate.state == "fail" { f64::NEG_INFINITY } else { f64::INFINITY })
 }
 
 fn gate(gate: &Gate) -> GateView {
@@ -189,7 +193,7 @@ fn gate(gate: &Gate) -> GateView {
         (true, false) if gate.threshold.is_none() => ("shown", 3),
         (true, false) => ("pass", 2),
     };
-    let plain = |value: Option<f64>| cell(value, |value| format::significant(value, DIGITS));
+    let plain = |value: Option<f64>| cell(value, number);
     let margin = gate.margin.filter(|margin| margin.is_finite());
     GateView {
         name: visible(&gate.name),
@@ -200,7 +204,7 @@ fn gate(gate: &Gate) -> GateView {
         candidate: plain(gate.candidate),
         value: Cell { text: with_unit(gate.value, gate.standard_error, gate.unit), raw: finite(gate.value) },
         threshold: Cell { text: threshold(gate), raw: finite(gate.threshold) },
-        margin: cell(margin, format::percent),
+        margin: Cell { text: words::margin(gate), raw: margin },
         bar: 100.0 * margin.unwrap_or(0.0).abs().min(1.0),
         is_beyond: margin.is_some_and(|margin| margin < 0.0),
         source: visible(&gate.source),
@@ -222,6 +226,15 @@ fn trimmed(number: &str) -> &str {
     if is_fraction { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }
 
+/// A pure number: what is whole is most likely counted, and shown without a fraction.
+fn number(value: f64) -> String {
+    if value.fract() == 0.0 && value.abs() < MOST_COUNTED {
+        format!("{}{}", if value < 0.0 { "-" } else { "" }, format::count(value.abs() as u64))
+    } else {
+        format::significant(value, DIGITS)
+    }
+}
+
 fn finite(value: Option<f64>) -> Option<f64> {
     value.filter(|value| value.is_finite())
 }
@@ -240,6 +253,7 @@ fn with_unit(value: Option<f64>, standard_error: Option<f64>, unit: &str) -> Str
         _ => {
             let number = match standard_error {
                 Some(_) => format::with_error(value, standard_error),
+                None if unit.is_empty() => number(value),
                 None => format::significant(value, DIGITS),
             };
             visible(format!("{number} {unit}").trim_end())
@@ -331,6 +345,9 @@ mod tests {
             (Some(2048.0), "bytes", "2.00 KiB"),
             (Some(-2048.0), "bytes", "-2.00 KiB"),
             (Some(0.5), "%", "0.5000 %"),
+            (Some(300.0), "", "300"),
+            (Some(-2.0), "", "-2"),
+            (Some(0.25), "", "0.2500"),
             (Some(f64::NAN), "", "–"),
             (None, "m", "–"),
         ];

@@ -371,8 +371,8 @@ mod tests {
             assert!((f64::from(value.y) / 10.0 - solution[i]).abs() / largest < 2e-3);
             assert_eq!(value.z, 0.0, "a channel without light stays dark");
         }
-        let ones = vec![Vec3::ONE; 8];
-        let direct = system.apply(&vec![Vec3::ZERO; 8]);
+        let ones = [Vec3::ONE; 8];
+        let direct = system.apply(&[Vec3::ZERO; 8]);
         history.set_image_of_ones(difference(&system.apply(&ones), &direct));
         let radius = history.spectral_radius(1e-3).unwrap();
         assert!((radius - 0.999).abs() < 2e-5, "{radius}");

@@ -58,7 +58,10 @@ fn a_comparison_leaves_its_page() {
     let mean = gates.iter().find(|g| g["name"] == "image.mean").unwrap();
     assert!((mean["value"].as_f64().unwrap() - 20.0).abs() < 0.01, "{mean}");
     let row = page.split("<bdi>image.mean</bdi>").nth(1).and_then(|rest| rest.split("</tr>").next()).unwrap();
-    assert!(row.contains("20") && row.contains('%') && !row.contains("2000"), "the change is not told in percent: {row}");
+    assert!(
+        row.contains("20") && row.contains('%') && !row.contains("2000"),
+        "the change is not told in percent: {row}"
+    );
 }
 
 #[test]

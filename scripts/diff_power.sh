@@ -6,15 +6,15 @@ source "$(dirname -- "${BASH_SOURCE[0]}")/lib.sh"
 
 only_help "usage: scripts/diff_power.sh
 
-Bakes and renders two_rooms_open at 0.5 m and 1 m and cornell at 0.25 m with the seeds 0 to 20. Compares neighbours: twenty pairs
-that differ in their seed only. Then bakes with the lamps some percent brighter, and looks for the least change that is caught in
-19 of 20 pairs: with another seed on each side, and with the same. RUNS="cornell:0.25" narrows it down.
+Bakes and renders scenes at a spacing each, fine and far too coarse, with the seeds 0 to 20. Compares neighbours: twenty pairs that
+differ in their seed only. Then bakes with the lamps some percent brighter, and looks for the least change that is caught in 19 of
+20 pairs: with another seed on each side, and with the same. RUNS="cornell:0.25 office:1" chooses scenes and spacings (m).
 LIGHTPROBE names a binary to use instead of building one." "$@"
 
 provide_lightprobe
 mkdir -p out/power
 
-python3 - "$lightprobe" out/power "${RUNS:-two_rooms_open:0.5 two_rooms_open:1 cornell:0.25}" <<'PYTHON'
+python3 - "$lightprobe" out/power "${RUNS:-cornell:0.25 two_rooms_open:0.5 two_rooms_open:1 two_rooms_open:2 courtyard:2 office:2}" <<'PYTHON'
 import json
 import struct
 import subprocess
@@ -36,6 +36,8 @@ def brighter(scene, factor):
         if "emissiveFactor" in material:
             strength = material["extensions"]["KHR_materials_emissive_strength"]
             strength["emissiveStrength"] *= factor
+    for light in document.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", []):
+        light["intensity"] = light.get("intensity", 1) * factor
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
     head = b"glTF" + struct.pack("<III", 2, 20 + len(text) + len(rest), len(text)) + b"JSON"
@@ -76,4 +78,6 @@ for run in runs:
             print(f"  {what}: {percent} % brighter is caught in {caught} of {PAIRS}", flush=True)
             if caught >= NEEDED:
                 break
+        else:
+            print(f"  {what}: up to {PERCENTS[-1]} % no change is caught in {NEEDED}", flush=True)
 PYTHON

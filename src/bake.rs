@@ -19,7 +19,7 @@ use crate::plan::Plan;
 use crate::probe::capture::{Capture, EmissionTransport, ProbeCapture, ReflectedLight};
 use crate::probe::checkpoint;
 use crate::probe::container::{Container, FileError};
-use crate::probe::file::{self, EncodingLosses, SceneRecord};
+use crate::probe::file::{self, EncodingLosses, Origin, SceneRecord};
 use crate::probe::filter::Kernel;
 use crate::probe::grid::GridError;
 use crate::probe::map::{OctahedralMaps, fill_with_border};
@@ -296,7 +296,10 @@ impl Prepared<'_, '_> {
         // Times stay out of the file: the same input must give the same bytes.
         let record: Vec<_> = plan.lines.iter().map(|l| crate::plan::Line { saved_s: None, ..l.clone() }).collect();
         let record = serde_json::json!({ "visibility": plan.visibility, "lines": record });
-        let (container, losses) = file::encode(&volume, encoding, &config.to_ron(), scene, &record);
+        let (container, losses) = {
+            let config = config.to_ron();
+            file::encode(&volume, encoding, &Origin { config: &config, scene, seed: circumstances.seed, plan: &record })
+        };
         times.encode = started.elapsed().as_secs_f64();
         numerics.clamped = losses.clamped.clone();
         numerics.underflowed = losses.underflowed.clone();

@@ -273,7 +273,7 @@ pub struct DiffArgs {
     /// What is to be judged, of the same kind.
     #[arg(value_name = "CANDIDATE")]
     pub candidate: PathBuf,
-    /// Folder for diff.json, diff.md, junit.xml and the difference maps; created where missing.
+    /// Folder for index.html, diff.json, diff.md, junit.xml and the difference maps; created where missing.
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
     /// Thresholds that go over the defaults, in the form of configs/diff.ron.

@@ -11,8 +11,9 @@ use crate::output::{self, Named, check_folder, check_outputs, create_folder, wri
 use crate::report::diff::mask::Mask;
 use crate::report::diff::shown::page as page_of;
 use crate::report::diff::thresholds::Thresholds;
-use crate::report::diff::words::{in_unit, margin, outcome, shell_word};
+use crate::report::diff::words::{in_unit, margin, outcome};
 use crate::report::diff::{Compared, DiffReport, Request, compare, junit, markdown};
+use crate::report::header::command_line_but;
 use crate::report::table::{Column, Table};
 use crate::report::{format, page};
 
@@ -38,7 +39,8 @@ pub fn run(args: &DiffArgs, console: &Console) -> Result<Outcome> {
         thresholds: &thresholds,
         allow_scene_change: args.allow_scene_change,
         mask: mask.as_ref(),
-        command: command_line(args),
+        // After an update it would be another comparison.
+        command_line: command_line_but(|word| word != "--update-baseline"),
     };
     let mut compared =
         compare(&request, |item| console.say(format!("comparing {}", if item.is_empty() { "the two" } else { item })))?;
@@ -78,23 +80,6 @@ fn check_paths(args: &DiffArgs) -> Result<()> {
         check_outputs(&outputs, &inputs)?;
     }
     Ok(())
-}
-
-/// What would ask for the same again; without --update-baseline, after which it would be another comparison.
-fn command_line(args: &DiffArgs) -> String {
-    let word = |path: &Path| shell_word(&path.display().to_string());
-    let mut line =
-        format!("lightprobe diff-report {} {} -o {}", word(&args.base), word(&args.candidate), word(&args.output));
-    if let Some(path) = &args.thresholds {
-        line += &format!(" --thresholds {}", word(path));
-    }
-    if args.allow_scene_change {
-        line += " --allow-scene-change";
-    }
-    if let Some(path) = &args.mask {
-        line += &format!(" --mask {}", word(path));
-    }
-    line
 }
 
 fn write(args: &DiffArgs, compared: &mut Compared) -> Result<()> {

@@ -74,6 +74,7 @@ fn to_json(file: &ProbeFile, probe: Option<u32>) -> Value {
         "encoding": {"irradiance": volume.curve.name(), "scale_irradiance": file.irradiance_scale},
         "tensors": tensors,
         "scene": file.scene,
+        "seed": file.seed,
         "plan": file.plan,
         "config": file.config,
     });
@@ -97,13 +98,14 @@ fn to_text(file: &ProbeFile, probe: Option<u32>) -> String {
     let [active, inside, unsampled] = states(volume);
     let mut out = format!(
         "{FORMAT}, {}, all hashes match\n\
-         scene     {} (BLAKE3 {})\n\
+         scene     {} (BLAKE3 {}), seed {}\n\
          grid      uniform, {} × {} × {} probes, spacing {} m, origin {} m, border {}\n\
          probes    {} ({active} active, {inside} inside geometry, {unsampled} never sampled)\n\
          encoding  irradiance {}, scale {}\n",
         format::bytes(file.file_bytes),
         file.scene.name,
         file.scene.blake3,
+        file.seed.map_or_else(|| "not known".to_owned(), |seed| seed.to_string()),
         grid.divisions.x,
         grid.divisions.y,
         grid.divisions.z,

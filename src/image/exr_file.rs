@@ -1,18 +1,19 @@
-//! An opened OpenEXR file and its blocks of pixels, one at a time.
+//! An opened OpenEXR file and its blocks of pixels, in order.
 //!
-//! No header is believed: what it makes the decoder allocate is bounded by the file's size, or by the block's. Decoding stays on
-//! one thread, because a damaged block must be an error and not a lost worker.
+//! No header is believed: what it makes the decoder allocate is bounded by the file's size, or by the block's. Blocks are decompressed
+//! on rayon's threads and not on those of the decoder, where a damaged block is a lost worker instead of an error.
 
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
 use exr::block::UncompressedBlock;
-use exr::block::chunk::CompressedBlock;
+use exr::block::chunk::{Chunk, CompressedBlock};
 use exr::block::reader::Reader;
 use exr::error::{Error as ExrError, Result as ExrResult};
 use exr::meta::header::Header;
 use exr::prelude::Compression;
+use rayon::prelude::*;
 
 use super::error::ImageError;
 use crate::input::open_file;
@@ -83,16 +84,24 @@ impl<'a> ExrFile<'a> {
             let chunks = self
                 .reader
                 .filter_chunks(true, |_, tile, block| is_wanted(block.layer, tile.is_largest_resolution_level()))?;
-            for chunk in chunks {
-                let chunk = chunk?;
-                // A table of offsets may point to another part's block.
-                if chunk.layer_index != part {
-                    return Err(ExrError::Invalid("a block belongs to another part".into()));
+            let mut chunks = chunks.into_iter();
+            // A few blocks at a time: each thread has one, and no more than these are in memory.
+            loop {
+                let batch: Vec<Chunk> = chunks.by_ref().take(rayon::current_num_threads()).collect::<ExrResult<_>>()?;
+                if batch.is_empty() {
+                    return Ok(());
                 }
-                check_block(header, &chunk.compressed_block)?;
-                take(&UncompressedBlock::decompress_chunk(chunk, &meta, true)?);
+                for chunk in &batch {
+                    // A table of offsets may point to another part's block.
+                    if chunk.layer_index != part {
+                        return Err(ExrError::Invalid("a block belongs to another part".into()));
+                    }
+                    check_block(header, &chunk.compressed_block)?;
+                }
+                let decompress = |chunk| UncompressedBlock::decompress_chunk(chunk, &meta, true);
+                let blocks: Vec<UncompressedBlock> = batch.into_par_iter().map(decompress).collect::<ExrResult<_>>()?;
+                blocks.iter().for_each(&mut take);
             }
-            Ok(())
         };
         decode_all().map_err(|error| exr_error(path, error))
     }

@@ -69,6 +69,8 @@ pub struct ProbeFile {
     /// Effective configuration, RON.
     pub config: String,
     pub scene: SceneRecord,
+    /// Of the bake's random numbers; `None` where the file does not say.
+    pub seed: Option<u64>,
     pub plan: Value,
     /// Bytes of every tensor.
     pub tensor_bytes: BTreeMap<String, u64>,
@@ -85,14 +87,18 @@ fn le_bytes<const N: usize>(numbers: impl Iterator<Item = [u8; N]>) -> Vec<u8> {
     numbers.flatten().collect()
 }
 
+/// What a volume was made from.
+#[derive(Debug, Clone, Copy)]
+pub struct Origin<'a> {
+    /// Effective configuration, RON.
+    pub config: &'a str,
+    pub scene: &'a SceneRecord,
+    pub seed: u64,
+    pub plan: &'a Value,
+}
+
 /// The volume as tensors. `encoding.border` must be that of the volume's maps.
-pub fn encode(
-    volume: &Volume,
-    encoding: &EncodingSettings,
-    config: &str,
-    scene: &SceneRecord,
-    plan: &Value,
-) -> (Container, EncodingLosses) {
+pub fn encode(volume: &Volume, encoding: &EncodingSettings, origin: &Origin) -> (Container, EncodingLosses) {
     let mut container = Container::default();
     let mut losses = EncodingLosses::default();
     let probes = volume.states.len();
@@ -146,10 +152,11 @@ pub fn encode(
     };
     for (key, value) in [
         ("format", FORMAT.to_owned()),
-        ("config", config.to_owned()),
+        ("config", origin.config.to_owned()),
         ("grid", json(&record)),
-        ("scene", json(scene)),
-        ("plan", json(plan)),
+        ("scene", json(origin.scene)),
+        ("seed", origin.seed.to_string()),
+        ("plan", json(origin.plan)),
         ("encoding.irradiance", volume.curve.name().to_owned()),
         ("scale.irradiance", json(&colors.scale)),
     ] {
@@ -275,6 +282,7 @@ fn decode(container: &Container, file_bytes: u64) -> Result<ProbeFile, String> {
         irradiance_scale,
         config: reader.text("config")?.clone(),
         scene: reader.json("scene")?,
+        seed: container.metadata.contains_key("seed").then(|| reader.json("seed")).transpose()?,
         plan: reader.json("plan")?,
         tensor_bytes: container.tensors.iter().map(|(n, t)| (n.clone(), t.bytes.len() as u64)).collect(),
         tensor_shapes: container

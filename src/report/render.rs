@@ -15,6 +15,8 @@ pub struct RenderReport {
     /// Its configuration is that of the bake.
     #[serde(flatten)]
     pub header: Header,
+    /// Of the probes' bake; `null` where their file does not say.
+    pub bake_seed: Option<u64>,
     /// Whether the probes were baked from other bytes than the scene now has (`--allow-scene-change`).
     pub scene_changed: bool,
     pub camera: String,

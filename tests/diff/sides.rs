@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::common::Folder;
 use crate::made::{diff, failing, report, text};
-use crate::program::one_error;
+use crate::program::{command, finish, one_error, scene, succeed};
 
 /// A picture with some structure.
 fn picture(width: u32, height: u32, scale: f32) -> Picture {
@@ -186,10 +186,110 @@ fn figures_of_one_side_only_are_undefined_and_fail() {
 }
 
 #[test]
+fn commands_give_the_sides_again() {
+    let folder = Folder::new();
+    fs::copy(scene("cornell"), folder.path().join("a room.glb")).unwrap();
+    let call = |words: &[&str]| finish(command().current_dir(folder.path()).args(words));
+    let coarse = ["--set", "grid.spacing_m=1", "-q"];
+    for seed in ["3", "4"] {
+        let (probes, report, run) = (format!("{seed}.probes"), format!("{seed}/bake.json"), format!("{seed}/it's"));
+        fs::create_dir(folder.path().join(seed)).unwrap();
+        let bake = ["bake", "a room.glb", "-o", &probes, "--report", &report, "--seed", seed];
+        assert_eq!(call(&[&bake[..], &coarse].concat()).code, Some(0));
+        let render = ["render", "a room.glb", &probes, "-o", &run, "--size", "32x18", "-q"];
+        assert_eq!(call(&render).code, Some(0));
+    }
+    let (_, found) = report(&call(&["diff-report", "3", "4", "-o", "out", "--json"]));
+    let commands: Vec<[String; 2]> = found["commands"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|c| ["purpose", "line"].map(|key| c[key].as_str().unwrap().to_owned()))
+        .collect();
+    let purposes: Vec<&str> = commands.iter().map(|c| c[0].as_str()).collect();
+    assert_eq!(purposes, ["compare", "bake, base", "render, base", "bake, candidate", "render, candidate"]);
+    assert_eq!(commands[0][1], "lightprobe diff-report 3 4 -o out --json");
+
+    // A shell that is told where the program lies makes the same again.
+    fs::rename(folder.path().join("3"), folder.path().join("before")).unwrap();
+    fs::create_dir(folder.path().join("3")).unwrap();
+    for [_, line] in &commands[1..3] {
+        let script = format!("lightprobe() {{ \"$LIGHTPROBE\" \"$@\"; }}; {line}");
+        let mut shell = std::process::Command::new("sh");
+        let shell = shell.args(["-c", &script]).current_dir(folder.path());
+        let run = finish(shell.env("LIGHTPROBE", env!("CARGO_BIN_EXE_lightprobe")));
+        assert_eq!(run.code, Some(0), "{line}: {}", run.stderr);
+    }
+    let (code, found) = report(&call(&["diff-report", "before", "3", "-o", "again", "--json"]));
+    assert_eq!(code, Some(0));
+    assert!(found["images"].as_array().unwrap().iter().all(|image| image["rmse"] == 0.0), "{}", found["images"]);
+}
+
+#[test]
+fn where_nothing_holds_a_command_a_note_says_so() {
+    let folder = Folder::new();
+    let image = exr(&folder, "a.exr", &picture(16, 9, 1.0));
+    let (_, found) = report(&diff(&folder, &image, &image, &[]));
+    assert_eq!(found["commands"].as_array().unwrap().len(), 1);
+    assert!(found["notes"].to_string().contains("only reports hold their command"), "{}", found["notes"]);
+    // Two lines would be two commands, and could end a comment's block of code.
+    let report_of = |line: &str| {
+        json!({"schema": "lightprobe-bake/1", "command": "bake", "command_line": line, "converged": true}).to_string()
+    };
+    let hostile = folder.write("hostile.json", report_of("lightprobe bake\nrm x"));
+    let (_, found) = report(&diff(&folder, &hostile, &hostile, &[]));
+    assert_eq!(found["commands"].as_array().unwrap().len(), 1, "{}", found["commands"]);
+}
+
+#[test]
+fn real_sweeps_are_judged() {
+    let folder = Folder::new();
+    let ladder = folder.write(
+        "ladder.ron",
+        "(ladders: [(name: \"tiny\", set: [\"placement.rays=32\"], axes: [(key: \"grid.spacing_m\", values: [2.0, 1.5])])])",
+    );
+    let sweep = |name: &str, words: &str| {
+        let (scene, out) = (scene("two_rooms_open"), folder.path().join(name));
+        let common = "--reference 32 --seeds 2 --no-progress --json";
+        let arguments = ["sweep", text(&scene), "-o", text(&out), "--ladder", text(&ladder)];
+        let arguments = arguments.into_iter().chain(common.split_whitespace()).chain(words.split_whitespace());
+        succeed(&arguments.collect::<Vec<_>>());
+        out
+    };
+    let base = sweep("base", "--size 32x18");
+    let (code, found) = report(&diff(&folder, &base, &base, &[]));
+    assert_eq!((code, failing(&found)), (Some(0), vec![]));
+    let gates = found["gates"].as_array().unwrap();
+    for (name, is_judged) in [
+        ("leak.light", true),
+        ("error.rmse", true),
+        ("error.flip", true),
+        ("memory.bytes_per_probe", true),
+        ("convergence", true),
+        ("time.bake", false),
+    ] {
+        let of = |g: &&Value| g["name"] == name && g["item"].as_str().unwrap().starts_with("tiny spacing_m=");
+        let found: Vec<&Value> = gates.iter().filter(of).collect();
+        assert_eq!(found.len(), 2, "{name}");
+        assert!(found.iter().all(|g| g["base"].is_number() && g["threshold"].is_number() == is_judged), "{found:?}");
+    }
+    let leaky = sweep("leaky", "--size 32x18 --set query.visibility=none");
+    let (code, found) = report(&diff(&folder, &base, &leaky, &[]));
+    assert!(code == Some(1) && failing(&found).contains(&"leak.fraction".to_owned()), "{:?}", failing(&found));
+    // Other seeds are noise.
+    let (code, found) = report(&diff(&folder, &base, &sweep("seeds", "--size 32x18 --seed 7"), &[]));
+    assert_eq!((code, failing(&found)), (Some(0), vec![]));
+    let other = Folder::new();
+    refused(&other, &base, &sweep("size", "--size 16x9"), &["width", "--size"]);
+}
+
+#[test]
 fn sweeps_are_compared_by_configuration() {
     let folder = Folder::new();
     let sweep = |name: &str, leak: f64, labels: &[&str]| {
-        let one = |label: &&str| json!({"label": label, "figures": {"leak": {"light": leak}, "error": {"rmse": 0.5}}});
+        let figure = |mean: f64| json!({"mean": mean, "min": mean, "max": mean, "standard_error": null});
+        let figures = json!({"leak_light": figure(leak), "error_rmse": figure(0.5)});
+        let one = |label: &&str| json!({"label": label, "figures": figures});
         let configurations: Vec<Value> = labels.iter().map(one).collect();
         let sweep = json!({"schema": "lightprobe-sweep/1", "configurations": configurations});
         folder.write(name, sweep.to_string())

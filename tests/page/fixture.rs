@@ -3,9 +3,10 @@
 use std::borrow::Cow;
 
 use glam::Vec3;
+use lightprobe::report::diff::Command;
 use lightprobe::report::diff::gate::Gate;
 use lightprobe::report::page::{
-    Command, Figure, FigureTable, Histogram, PackedImage, Page, PageImage, Plot, ProbeComparison, ProbeRow, Side,
+    Figure, FigureTable, Histogram, PackedImage, Page, PageImage, Plot, ProbeComparison, ProbeRow, Side,
 };
 
 /// Breaks out of attributes, elements, scripts and comments, and turns the text after it around.
@@ -38,6 +39,7 @@ fn pair(name: &str, width: u32, height: u32, of: impl Fn(usize, u32, u32) -> Vec
         candidate: side(1),
         exposure_ev: EXPOSURE_EV,
         is_display_referred: false,
+        is_judged: true,
         is_compared: None,
         figures: vec![
             Figure { name: "rmse".to_owned(), value: Some(0.0123), ..Figure::default() },
@@ -147,7 +149,7 @@ pub fn page_of(images: Vec<PageImage<'static>>) -> String {
         }],
         added: vec!["dark/extra.exr".to_owned()],
         missing: vec![HOSTILE.to_owned()],
-        commands: vec![
+        commands: &[
             Command {
                 purpose: "Bake the candidate".to_owned(),
                 line: "lightprobe bake scenes/two_rooms_open.glb -o candidate.probes --set grid.spacing_m=1 --set query.visibility=none --seed 7".to_owned(),
@@ -167,6 +169,7 @@ pub fn page() -> String {
     let mut third =
         pair("probes.png", 40, 30, |side, x, y| Vec3::new(x as f32 / 40.0, y as f32 / 30.0, 0.5 * side as f32));
     third.is_display_referred = true;
+    third.is_judged = false;
     third.unit = String::new();
     page_of(vec![first, second, third])
 }

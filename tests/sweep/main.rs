@@ -50,7 +50,9 @@ fn timeless(mut value: Value) -> Value {
     fn strip(value: &mut Value) {
         match value {
             Value::Object(map) => {
-                map.retain(|key, _| !["time_s", "bake_s", "shade_ms", "lookup_ns"].contains(&key.as_str()));
+                map.retain(|key, _| {
+                    !["command_line", "time_s", "bake_s", "shade_ms", "lookup_ns"].contains(&key.as_str())
+                });
                 map.values_mut().for_each(strip);
             }
             Value::Array(list) => list.iter_mut().for_each(strip),

@@ -6,7 +6,7 @@ use super::config_changes::config_changes;
 use super::gate::{self, Finding, Gate};
 use super::images::ImageReport;
 use super::sides::Side;
-use super::{About, Compared, DiffReport, Found, Request, SCHEMA, SideReport, Verdict};
+use super::{About, Command, Compared, DiffReport, Found, Request, SCHEMA, SideReport, Verdict};
 use crate::image::Picture8;
 
 /// Gates that a scene which is allowed to change does not fail by that alone.
@@ -46,9 +46,14 @@ pub(super) fn conclude(request: &Request, sides: &[Side; 2], mut found: Found) -
             false => format!("The seeds are {a} and {b}: the sides differ by their noise at least."),
         });
     }
-    let mut commands = vec![request.command.clone()];
-    let mut known = BTreeSet::new();
-    commands.extend(found.commands.into_iter().filter(|command| known.insert(command.clone())));
+    let mut commands = vec![Command { purpose: "compare".to_owned(), line: request.command_line.clone() }];
+    for (about, side) in found.about.iter().zip(sides) {
+        commands.extend(about.commands.iter().cloned());
+        if about.commands.is_empty() {
+            let path = side.path.display();
+            notes.push(format!("What made {path} is not known: only reports hold their command, and none lies there."));
+        }
+    }
     let report = DiffReport {
         schema: SCHEMA,
         version: env!("CARGO_PKG_VERSION"),

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::noise::Noise;
+
 /// A figure of the comparison, the bound that it is held to, and whether it holds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Gate {
@@ -51,6 +53,8 @@ pub struct Finding {
     pub value: Option<f64>,
     pub unit: &'static str,
     pub standard_error: Option<f64>,
+    /// Of both sides.
+    pub noise: Noise,
     /// What a relative limit of 1 allows, in `unit`: the base's figure for differences, 100 for percentages.
     pub scale: f64,
     pub direction: Direction,
@@ -70,7 +74,8 @@ impl Finding {
         let value = base.zip(candidate).map(|(b, c)| c - b);
         let (item, explanation) = (item.to_owned(), explanation.into());
         let scale = base.unwrap_or(0.0).abs();
-        Finding { name, item, base, candidate, value, unit, standard_error: None, scale, direction, explanation }
+        let (standard_error, noise) = (None, Noise::default());
+        Finding { name, item, base, candidate, value, unit, standard_error, noise, scale, direction, explanation }
     }
 
     /// candidate ÷ base − 1, in percent.

@@ -1,12 +1,15 @@
 //! What is judged of two pictures.
 
+use std::path::Path;
+
 use glam::Vec3;
 
 use super::DiffError;
 use super::gate::{Direction, Finding};
-use super::images::{ImageReport, Pair, Sums, read};
-use super::ratio::{Part, change};
-use crate::image::Picture;
+use super::images::{ImageReport, Pair, Sums};
+use super::noise::Noise;
+use super::ratio::{OF_UNEVENNESS, Part, change};
+use crate::image::{LayeredImage, Picture};
 
 /// Light below this share of the mean does not count as a pixel's own.
 const DARK_SHARE: f64 = 0.05;
@@ -14,9 +17,8 @@ const DARK_SHARE: f64 = 0.05;
 /// A pixel has changed when it has by more than this share of its own light.
 const CHANGED_SHARE: f64 = 0.5;
 
-/// What the probes that many pixels share do to the noise of a picture's mean, beyond what its blocks show. Without it means of
-/// different seeds lay up to 2.3 of the standard errors apart where probes stood 1 m apart (`two_rooms_open`, `cornell`), but up
-/// to 6 in a room of 2 m probes that is lit through one door.
+/// What the probes that many pixels share do to the noise of a picture's mean, beyond what its blocks show. Enough where probes
+/// stand close; where few light the picture, [`OF_UNEVENNESS`] is.
 const SHARED_PROBES: f64 = 2.0;
 
 /// By how much albedo may differ, and the components of a normal, and depth as a share of itself, before a pixel shows
@@ -36,6 +38,7 @@ pub(super) fn findings(
     blocks: &[Part],
     used: &[bool],
     [base, candidate]: [&Picture; 2],
+    noise: Noise,
 ) -> Vec<Finding> {
     let whole = change(blocks).filter(|_| sums.pixels > 0);
     let means = [report.mean_base, report.mean_candidate];
@@ -56,6 +59,9 @@ pub(super) fn findings(
     };
     let changed = (0..used.len()).filter(|i| used[*i]).filter(is_changed).count();
     let share = (sums.pixels > 0).then(|| 100.0 * changed as f64 / sums.pixels as f64);
+    let of_blocks = whole.and_then(|w| w.standard_error).map(|error| SHARED_PROBES * error);
+    let of_unevenness = sums.unevenness.filter(|_| noise == Noise::Other).map(|share| 100.0 * OF_UNEVENNESS * share);
+    let mean_error = of_blocks.into_iter().chain(of_unevenness).reduce(f64::max);
     let non_finite = [sums.non_finite[0] as f64, sums.non_finite[1] as f64].map(Some);
     let mut findings = vec![
         Finding::difference(
@@ -66,7 +72,7 @@ pub(super) fn findings(
             Direction::Increase,
             "Pixels that are NaN or infinite.",
         ),
-        mean.with_error(whole.and_then(|w| w.standard_error).map(|error| SHARED_PROBES * error)),
+        mean.with_error(mean_error),
         Finding::percentage(
             "image.rmse",
             item,
@@ -92,17 +98,18 @@ pub(super) fn findings(
 
 /// Share of pixels that show another surface: no light and no noise in it.
 pub(super) fn surfaces(pair: &Pair) -> Result<Finding, DiffError> {
-    let mut differs: Vec<bool> = Vec::new();
+    let read = |path: &Path| LayeredImage::read_exr_layers(path, |name| SURFACE.contains(&name));
+    let (base, candidate) = rayon::join(|| read(&pair.base), || read(&pair.candidate));
+    let (base, candidate) = (base?, candidate?);
+    let mut differs = vec![false; base.width as usize * base.height as usize];
     for layer in SURFACE {
-        let (base, _) = read(&pair.base, layer)?;
-        let (candidate, _) = read(&pair.candidate, layer)?;
-        differs.resize(base.pixels.len(), false);
+        let [Some(base), Some(candidate)] = [&base, &candidate].map(|image| image.layer(layer)) else { continue };
         let differ = |b: Vec3, c: Vec3| match layer {
             "albedo" => (b - c).abs().max_element() > SAME_ALBEDO,
             "normal" => (b - c).abs().max_element() > SAME_NORMAL,
             _ => (b.x - c.x).abs() > SAME_DEPTH * b.x.abs(),
         };
-        let pixels = base.pixels.iter().zip(&candidate.pixels);
+        let pixels = base.iter().zip(candidate);
         differs.iter_mut().zip(pixels).for_each(|(d, (b, c))| *d |= differ(*b, *c));
     }
     let counts = |i: &usize| pair.mask.is_none_or(|mask| mask.counts[*i]);

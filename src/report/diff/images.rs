@@ -12,7 +12,8 @@ use super::DiffError;
 use super::gate::Finding;
 use super::image_gates::{SURFACE, findings, surfaces};
 use super::mask::Mask;
-use super::ratio::Part;
+use super::noise::Noise;
+use super::ratio::{Part, unevenness};
 use super::shown;
 use crate::image::{AnyImage, ImageHeader, Picture, Picture8};
 use crate::math::color::{byte_from_unit, luminance};
@@ -107,6 +108,8 @@ pub struct Pair<'a> {
     pub judged: bool,
     /// That of a report; else the base's own.
     pub exposure_ev: Option<f32>,
+    /// Of both sides.
+    pub noise: Noise,
     /// White counts.
     pub mask: Option<&'a Mask>,
 }
@@ -119,6 +122,17 @@ pub struct Compared {
     /// In the order of `reports`, as is what the page shows.
     pub maps: Vec<Option<Picture8>>,
     pub shown: Vec<PackedImage>,
+    /// Of the indirect irradiance of a judged pair that has it.
+    pub unevenness: Option<Unevenness>,
+}
+
+/// How unequally the pixels' luminance changed: see [`unevenness`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unevenness {
+    /// Of the base's mean.
+    pub share: f64,
+    /// That share of it, in the picture's unit.
+    pub absolute: f64,
 }
 
 /// Refuses pictures that cannot be compared, by their headers. `kept`: bytes that pairs before this one leave in memory; returned
@@ -193,7 +207,7 @@ pub fn compare(pair: &Pair, pairs: usize) -> Result<Compared, DiffError> {
 }
 
 /// One layer of one file.
-pub(super) fn read(path: &Path, layer: &str) -> Result<(Picture, bool), DiffError> {
+fn read(path: &Path, layer: &str) -> Result<(Picture, bool), DiffError> {
     let AnyImage { image, is_display } = AnyImage::read(path, |name| name == layer)?;
     let picture = image.picture(layer).unwrap_or_else(|| Picture::new(image.width, image.height));
     Ok((picture, is_display))
@@ -208,6 +222,8 @@ pub(super) struct Sums {
     pub(super) base: f64,
     luminance: [f64; 2],
     pub(super) non_finite: [usize; 2],
+    /// Of the luminance: see [`unevenness`].
+    pub(super) unevenness: Option<f64>,
     worst: Option<(f64, usize)>,
 }
 
@@ -217,8 +233,8 @@ fn compare_layer(
     pairs: usize,
     compared: &mut Compared,
 ) -> Result<(), DiffError> {
-    let (base, is_display) = read(&pair.base, layer)?;
-    let (candidate, _) = read(&pair.candidate, layer)?;
+    let (base, candidate) = rayon::join(|| read(&pair.base, layer), || read(&pair.candidate, layer));
+    let ((base, is_display), (candidate, _)) = (base?, candidate?);
     let counts = |i: usize| pair.mask.is_none_or(|mask| mask.counts[i]);
     let finite = |i: usize| base.pixels[i].is_finite() && candidate.pixels[i].is_finite();
     let used: Vec<bool> = (0..base.pixels.len()).map(|i| counts(i) && finite(i)).collect();
@@ -246,21 +262,31 @@ fn compare_layer(
         let block = x * BLOCKS / base.width + BLOCKS * (y * BLOCKS / base.height);
         blocks[block as usize].add(l[0], l[1]);
     }
+    let light = |picture: &Picture, i: usize| f64::from(luminance(picture.pixels[i]));
+    let compared_pixels = (0..used.len()).filter(|i| used[*i]);
+    sums.unevenness = unevenness(compared_pixels.map(|i| [light(&base, i), light(&candidate, i)]));
     let exposure_ev = (!is_display).then(|| pair.exposure_ev.unwrap_or_else(|| base.auto_exposure_ev()));
-    // What is no light has no look: irradiance is compared in numbers alone.
-    let flip = if layer == LIGHT[1] { None } else { flip(&base, &candidate, exposure_ev, &used) };
     let item = if is_named { join(&pair.item, layer) } else { pair.item.clone() };
-    let report = report(pair, layer, &item, &sums, flip, [&base, &candidate], exposure_ev);
-    if pair.judged {
-        compared.findings.extend(findings(&item, &report, &sums, &blocks, &used, [&base, &candidate]));
-    }
     let unit = match layer {
         _ if is_display => "",
         "beauty" => "W·m⁻²·sr⁻¹",
         _ => "W·m⁻²",
     };
+    let (flip, map) = rayon::join(
+        // What is no light has no look: irradiance is compared in numbers alone.
+        || if layer == LIGHT[1] { None } else { flip(&base, &candidate, exposure_ev, &used) },
+        || difference_map((&item, unit), &base, &candidate, &used),
+    );
+    let report = report(pair, layer, &item, &sums, flip, (&used, [&base, &candidate]), exposure_ev);
+    if pair.judged {
+        compared.findings.extend(findings(&item, &report, &sums, &blocks, &used, [&base, &candidate], pair.noise));
+        if layer == LIGHT[1] {
+            let of_mean = |(share, mean)| Unevenness { share, absolute: share * mean };
+            compared.unevenness = sums.unevenness.zip(report.mean_base).map(of_mean);
+        }
+    }
     compared.shown.push(shown::image(&report, unit, &used, [&base, &candidate], pairs)?);
-    compared.maps.push(Some(difference_map((&item, unit), &base, &candidate, &used)));
+    compared.maps.push(Some(map));
     compared.reports.push(report);
     Ok(())
 }
@@ -276,7 +302,7 @@ fn report(
     item: &str,
     sums: &Sums,
     flip: Option<FlipFigures>,
-    [base, candidate]: [&Picture; 2],
+    (used, [base, candidate]): (&[bool], [&Picture; 2]),
     exposure_ev: Option<f32>,
 ) -> ImageReport {
     let samples = 3.0 * sums.pixels as f64;
@@ -298,7 +324,7 @@ fn report(
         mean_candidate: any(sums.luminance[1] / sums.pixels as f64),
         mae: any(sums.absolute / samples),
         rmse: any(square.sqrt()),
-        relmse: relmse(base, candidate, epsilon).filter(|_| sums.pixels > 0 && epsilon > 0.0),
+        relmse: relmse(used, [base, candidate], epsilon).filter(|_| sums.pixels > 0 && epsilon > 0.0),
         psnr_db: any(-10.0 * square.log10()).filter(|_| square > 0.0),
         flip,
         worst: sums.worst.map(|(_, i)| WorstPixel {
@@ -313,10 +339,10 @@ fn report(
     }
 }
 
-fn relmse(base: &Picture, candidate: &Picture, epsilon: f64) -> Option<f64> {
-    let terms = base.pixels.iter().zip(&candidate.pixels).filter(|(b, c)| b.is_finite() && c.is_finite());
+fn relmse(used: &[bool], [base, candidate]: [&Picture; 2], epsilon: f64) -> Option<f64> {
+    let terms = base.pixels.iter().zip(&candidate.pixels).zip(used).filter(|(_, used)| **used);
     let (mut sum, mut count) = (0.0, 0.0f64);
-    for (b, c) in terms {
+    for ((b, c), _) in terms {
         for channel in 0..3 {
             let (b, c) = (f64::from(b[channel]), f64::from(c[channel]));
             sum += (c - b) * (c - b) / (b * b + epsilon);

@@ -61,7 +61,7 @@ pub fn text(report: &DiffReport) -> String {
     folded.extend(images(report));
     folded.extend(probes(report));
     folded.extend(changes(report));
-    let commands: String = report.commands.iter().map(|c| format!("    {c}\n")).collect();
+    let commands: String = report.commands.iter().map(|c| format!("    {}\n", c.line)).collect();
     folded.push(("How to get this again".to_owned(), commands));
     for (title, body) in folded {
         let block = format!("<details><summary>{title}</summary>\n\n{body}\n</details>\n\n");

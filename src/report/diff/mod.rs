@@ -3,6 +3,7 @@
 //! [`sides`] finds what there is, [`probes`], [`images`] and [`figures`] compare it and make findings, [`thresholds`] judges
 //! these into [`gate`]s, and [`markdown`], [`junit`] and [`shown`] tell of them. Nothing is written here.
 
+mod bakes;
 mod conclude;
 pub mod config_changes;
 pub mod figures;
@@ -12,13 +13,16 @@ pub mod images;
 pub mod junit;
 pub mod markdown;
 pub mod mask;
+mod noise;
 mod pairs;
 pub mod probes;
 pub mod ratio;
+mod renders;
 pub mod shown;
 pub mod sides;
 pub mod storage;
 mod sweep_plot;
+mod sweeps;
 pub mod thresholds;
 pub mod words;
 
@@ -32,13 +36,14 @@ use self::config_changes::ConfigChange;
 use self::figures::Figure;
 use self::gate::{Finding, Gate};
 use self::images::ImageReport;
+use self::images::Pair;
 use self::mask::Mask;
+use self::noise::Noise;
 use self::pairs::{check, image_pair, pair_up, pictures, shown_pairs};
 use self::probes::ProbesReport;
 use self::shown::Shown;
 use self::sides::{Item, Side};
 use self::thresholds::Thresholds;
-use self::words::shell_word;
 use crate::image::{ImageError, Picture8};
 use crate::memory::TooLittleMemory;
 use crate::probe::container::FileError;
@@ -99,6 +104,14 @@ pub struct Verdict {
     pub sentence: String,
 }
 
+/// A line for a shell, and what it is for.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Command {
+    /// Such as "bake, base".
+    pub purpose: String,
+    pub line: String,
+}
+
 /// All of a comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DiffReport {
@@ -119,8 +132,8 @@ pub struct DiffReport {
     pub config_changes: Vec<ConfigChange>,
     pub thresholds: Thresholds,
     pub notes: Vec<String>,
-    /// What gives this report again, and its sides as far as their reports tell.
-    pub commands: Vec<String>,
+    /// What gives this report again: the comparison, then what made its sides, as far as their reports tell.
+    pub commands: Vec<Command>,
 }
 
 /// A comparison and its pictures, by the names that the report gives them.
@@ -139,8 +152,8 @@ pub struct Request<'a> {
     pub thresholds: &'a Thresholds,
     pub allow_scene_change: bool,
     pub mask: Option<&'a Mask>,
-    /// The command line that asks for it.
-    pub command: String,
+    /// That asks for it.
+    pub command_line: String,
 }
 
 /// What is found while the items are gone through.
@@ -157,7 +170,6 @@ struct Found {
     added: Vec<String>,
     missing: Vec<String>,
     about: [About; 2],
-    commands: Vec<String>,
 }
 
 /// What a side says of itself.
@@ -166,6 +178,8 @@ struct About {
     seed: Option<u64>,
     config: Option<String>,
     scene: Option<String>,
+    /// Each once, in the order of the items.
+    commands: Vec<Command>,
 }
 
 /// Compares two sides. `on_item` is told what is being compared.
@@ -201,22 +215,27 @@ fn compare_item(
     }
     match (base, candidate) {
         (Item::Render { folder: a, report: b_report }, Item::Render { folder: b, report: c_report }) => {
-            found.take_figures(figures::renders(name, b_report, c_report));
+            let noise = Noise::of_reports([b_report, c_report]);
+            let mut unevenness = None;
             for pair in pictures(name, [a, b], b_report, request.mask) {
                 match (pair.base.is_file(), pair.candidate.is_file()) {
-                    (true, true) => found.take_images(images::compare(&pair, found.shown_pairs)?),
+                    (true, true) => {
+                        let compared = images::compare(&Pair { noise, ..pair }, found.shown_pairs)?;
+                        unevenness = unevenness.or(compared.unevenness.filter(|_| noise == Noise::Other));
+                        found.take_images(compared, noise);
+                    }
                     (true, false) if pair.judged => found.missing.push(pair.item),
                     (false, true) if pair.judged => found.added.push(pair.item),
                     // A baseline need not keep what does not decide.
                     _ => {}
                 }
             }
-            found.commands.extend([b_report, c_report].into_iter().filter_map(render_command));
+            found.take_figures(renders::renders(name, b_report, c_report, unevenness), noise);
         }
-        (Item::Bake(a), Item::Bake(b)) => found.take_figures(figures::bakes(name, a, b)),
+        (Item::Bake(a), Item::Bake(b)) => found.take_figures(bakes::bakes(name, a, b), Noise::of_reports([a, b])),
         (Item::Sweep(a), Item::Sweep(b)) => {
-            let (compared, [missing, added]) = figures::sweeps(name, a, b);
-            found.take_figures(compared);
+            let (compared, [missing, added]) = sweeps::sweeps(name, a, b);
+            found.take_figures(compared, Noise::of_reports([a, b]));
             found.missing.extend(missing);
             found.added.extend(added);
             found.shown.plots.extend(sweep_plot::plot(name, a, b));
@@ -224,17 +243,19 @@ fn compare_item(
         (Item::Probes(a), Item::Probes(b)) => {
             let (report, findings, files) = probes::compare(name, a, b)?;
             found.probes.push(report);
-            found.findings.extend(findings);
+            let noise = Noise::of([files[0].seed, files[1].seed]);
+            found.take(findings, noise);
             let [base, candidate] = &files;
             found.findings.push(figures::scene(name, [&base.scene.blake3, &candidate.scene.blake3]));
             for (side, file) in files.iter().enumerate() {
+                found.about[side].seed = found.about[side].seed.or(file.seed);
                 found.about[side].config.get_or_insert_with(|| file.config.clone());
                 found.about[side].scene.get_or_insert_with(|| file.scene.blake3.clone());
             }
         }
         (Item::Image(a), Item::Image(b)) => {
             let pair = image_pair(name, a, b, request.mask);
-            found.take_images(images::compare(&pair, found.shown_pairs)?);
+            found.take_images(images::compare(&pair, found.shown_pairs)?, Noise::Unknown);
         }
         // Kinds were compared when the items were paired.
         _ => {}
@@ -242,31 +263,36 @@ fn compare_item(
     Ok(())
 }
 
-/// The command that made a render, but for the paths of its inputs, which its report does not hold.
-fn render_command(report: &Value) -> Option<String> {
-    let (camera, seed) = (report["camera"].as_str()?, report["seed"].as_u64()?);
-    let (width, height) = (report["width"].as_u64()?, report["height"].as_u64()?);
-    let camera = shell_word(camera);
-    Some(format!("lightprobe render SCENE PROBES -o DIR --camera {camera} --size {width}x{height} --seed {seed}"))
-}
-
 impl Found {
     fn note(&mut self, side: usize, report: Option<&Value>) {
         let Some(report) = report else { return };
         let about = &mut self.about[side];
+        if let (Some(command), Some(line)) = (report["command"].as_str(), report["command_line"].as_str())
+            && about.commands.iter().all(|known| known.line != line)
+            // A line that is several is for no shell, and for no comment under a pull request.
+            && !line.contains(char::is_control)
+        {
+            let side = ["base", "candidate"][side];
+            about.commands.push(Command { purpose: format!("{command}, {side}"), line: line.to_owned() });
+        }
         let text = |key: &str| report[key].as_str().map(str::to_owned);
-        about.seed = about.seed.or(report["seed"].as_u64());
+        // The noise of a render is that of its probes.
+        about.seed = about.seed.or(report["bake_seed"].as_u64()).or(report["seed"].as_u64());
         about.config = about.config.take().or_else(|| text("config"));
         about.scene = about.scene.take().or_else(|| text("scene_blake3"));
     }
 
-    fn take_figures(&mut self, compared: figures::Compared) {
-        self.findings.extend(compared.findings);
+    fn take(&mut self, findings: Vec<Finding>, noise: Noise) {
+        self.findings.extend(findings.into_iter().map(|finding| Finding { noise, ..finding }));
+    }
+
+    fn take_figures(&mut self, compared: figures::Compared, noise: Noise) {
+        self.take(compared.findings, noise);
         self.figures.extend(compared.figures);
     }
 
-    fn take_images(&mut self, compared: images::Compared) {
-        self.findings.extend(compared.findings);
+    fn take_images(&mut self, compared: images::Compared, noise: Noise) {
+        self.take(compared.findings, noise);
         self.images.extend(compared.reports);
         self.maps.extend(compared.maps);
         self.shown.images.extend(compared.shown);

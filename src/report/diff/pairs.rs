@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use super::images::{self, LIGHT, Pair, join};
 use super::mask::Mask;
+use super::noise::Noise;
 use super::sides::{Item, RENDER_PICTURES, Side};
 use super::{DiffError, Request, figures};
 
@@ -61,7 +62,7 @@ pub(super) fn pictures<'m>(
     let exposure_ev = figures::number(report, "exposure_ev").map(|ev| ev as f32);
     let pair = |&(picture, judged): &(&str, bool)| {
         let [base, candidate] = [base, candidate].map(|folder| folder.join(format!("{picture}.exr")));
-        Pair { item: join(name, picture), base, candidate, judged, exposure_ev, mask }
+        Pair { item: join(name, picture), base, candidate, judged, exposure_ev, noise: Noise::Unknown, mask }
     };
     RENDER_PICTURES.iter().map(pair).collect()
 }
@@ -71,22 +72,28 @@ pub(super) fn check(base: &Item, candidate: &Item, request: &Request, kept: f64)
     let mask = request.mask;
     match (base, candidate) {
         (Item::Render { folder: a, report: b_report }, Item::Render { folder: b, report: c_report }) => {
-            for key in ["camera", "width", "height"] {
-                if b_report[key] != c_report[key] {
-                    let (x, y) = (&b_report[key], &c_report[key]);
-                    let what = format!("{key} {x} and {key} {y}; render both with the same --camera and --size");
-                    return Err(DiffError::Incomparable { base: a.clone(), candidate: b.clone(), what });
-                }
-            }
+            same_view([a, b], [b_report, c_report])?;
             let pairs = pictures("", [a, b], b_report, mask);
             pairs
                 .iter()
                 .filter(|p| p.base.is_file() && p.candidate.is_file())
                 .try_fold(kept, |kept, pair| images::check(pair, kept))
         }
+        (Item::Sweep(a), Item::Sweep(b)) => same_view([request.base, request.candidate], [a, b]).map(|()| kept),
         (Item::Image(a), Item::Image(b)) => images::check(&image_pair("", a, b, mask), kept),
         _ => Ok(kept),
     }
+}
+
+/// Refuses reports of other cameras or sizes.
+fn same_view([base, candidate]: [&Path; 2], [a, b]: [&Value; 2]) -> Result<(), DiffError> {
+    for key in ["camera", "width", "height"] {
+        if a[key] != b[key] {
+            let what = format!("{key} {} and {key} {}; make both with the same --camera and --size", a[key], b[key]);
+            return Err(DiffError::Incomparable { base: base.to_owned(), candidate: candidate.to_owned(), what });
+        }
+    }
+    Ok(())
 }
 
 pub(super) fn image_pair<'m>(name: &str, base: &Path, candidate: &Path, mask: Option<&'m Mask>) -> Pair<'m> {
@@ -96,6 +103,7 @@ pub(super) fn image_pair<'m>(name: &str, base: &Path, candidate: &Path, mask: Op
         candidate: candidate.to_owned(),
         judged: true,
         exposure_ev: None,
+        noise: Noise::Unknown,
         mask,
     }
 }

@@ -9,8 +9,7 @@ use super::{DiffReport, SideReport};
 use crate::image::Picture;
 use crate::probe::placement::ProbeState;
 use crate::report::page::{
-    Command, Figure, FigureTable, Histogram, PackedImage, Page, PageError, PageImage, Plot, ProbeComparison, ProbeRow,
-    Side,
+    Figure, FigureTable, Histogram, PackedImage, Page, PageError, PageImage, Plot, ProbeComparison, ProbeRow, Side,
 };
 
 /// A comparison's parts that only the page shows.
@@ -21,26 +20,19 @@ pub struct Shown {
     pub plots: Vec<Plot>,
 }
 
-/// The page of a comparison; judged pictures first, as they keep their resolution longest.
+/// The page of a comparison.
 pub fn page(report: &DiffReport, shown: Shown) -> Page<'_> {
-    let mut images: Vec<(bool, PackedImage)> =
-        report.images.iter().map(|image| image.judged).zip(shown.images).collect();
-    images.sort_by_key(|(is_judged, _)| !is_judged);
-    let commands = report.commands.iter().enumerate().map(|(i, line)| Command {
-        purpose: if i == 0 { "Compare" } else { "Render a side; its report does not hold the paths" }.to_owned(),
-        line: line.clone(),
-    });
     Page {
         title: format!("{} against {}", report.candidate.path, report.base.path),
         sides: [side(&report.base), side(&report.candidate)],
         gates: &report.gates,
-        images: images.into_iter().map(|(_, image)| image).collect(),
+        images: shown.images,
         probes: report.probes.iter().map(probe_comparison).collect(),
         figures: tables(&report.figures),
         plots: shown.plots,
         added: report.added.clone(),
         missing: report.missing.clone(),
-        commands: commands.collect(),
+        commands: &report.commands,
         notes: report.notes.clone(),
     }
 }
@@ -80,6 +72,7 @@ pub(super) fn image(
             candidate: Cow::Borrowed(&candidate.pixels),
             exposure_ev: report.exposure_ev.unwrap_or(0.0),
             is_display_referred: report.is_display,
+            is_judged: report.judged,
             is_compared: Some(used),
             figures: image_figures(report, unit),
             worst_pixel: report.worst.map(|worst| [worst.x, worst.y]),

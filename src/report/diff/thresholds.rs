@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::gate::{Direction, Finding, Gate};
+use super::noise::Noise;
 use crate::config::messages;
 use crate::input::read_file;
 
@@ -28,6 +29,9 @@ pub struct Limit {
     /// Standard errors of the figure, where they are known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_errors: Option<f64>,
+    /// Like `relative`, where the sides drew other random numbers: what noise alone may do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub other_seeds: Option<f64>,
 }
 
 /// A limit for some items only.
@@ -120,12 +124,13 @@ impl Thresholds {
     /// Holds a finding against its limit.
     pub fn judge(&self, finding: Finding) -> Gate {
         let (limit, source) = self.limit(finding.name, &finding.item);
-        let Finding { name, item, base, candidate, value, unit, standard_error, scale, direction, explanation } =
+        let Finding { name, item, base, candidate, value, unit, standard_error, noise, scale, direction, explanation } =
             finding;
         let bounds = [
             limit.absolute,
             limit.relative.map(|share| share * scale),
             limit.standard_errors.zip(standard_error).map(|(count, error)| count * error),
+            limit.other_seeds.filter(|_| noise == Noise::Other).map(|share| share * scale),
         ];
         let is_judged = limit != Limit::default();
         // A limit in standard errors alone, of a figure without one, allows nothing.
@@ -180,9 +185,12 @@ fn parse(text: &str, place: &str) -> Result<File, ThresholdsError> {
 }
 
 fn check(limit: &Limit) -> Result<(), String> {
-    for (key, value) in
-        [("absolute", limit.absolute), ("relative", limit.relative), ("standard_errors", limit.standard_errors)]
-    {
+    for (key, value) in [
+        ("absolute", limit.absolute),
+        ("relative", limit.relative),
+        ("standard_errors", limit.standard_errors),
+        ("other_seeds", limit.other_seeds),
+    ] {
         if let Some(value) = value.filter(|v| !(*v >= 0.0 && v.is_finite())) {
             return Err(format!("{key} is {value}: write a number from 0 up"));
         }

@@ -34,28 +34,11 @@ pub fn margin(gate: &Gate) -> String {
     }
 }
 
-/// A word as a POSIX shell reads it back.
-pub fn shell_word(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::report::diff::gate::{Direction, Finding};
     use crate::report::diff::thresholds::Thresholds;
-
-    #[test]
-    fn words_for_the_shell() {
-        assert_eq!(shell_word("out/a_b-1.exr"), "out/a_b-1.exr");
-        assert_eq!(shell_word("it's; rm"), r"'it'\''s; rm'");
-        assert_eq!(shell_word(""), "''");
-    }
 
     #[test]
     fn a_gate_at_zero_shows_no_share() {

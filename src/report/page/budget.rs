@@ -15,15 +15,18 @@ pub fn factors(finest: u32) -> impl Iterator<Item = u32> {
 
 /// Chooses from pairs, which come in order of importance and each at several resolutions ([`factors`]), what takes at most `budget`
 /// bytes: as long as they are too large, the last pair that has its full resolution is halved, then the last of those at a half, and
-/// so on; at last pairs are left out from the end.
-pub fn fit(mut pairs: Vec<Vec<Embedded>>, budget: usize) -> Vec<Option<Embedded>> {
+/// so on; those after the first `judged` all the way before any of the first. At last pairs are left out from the end.
+pub fn fit(mut pairs: Vec<Vec<Embedded>>, judged: usize, budget: usize) -> Vec<Option<Embedded>> {
     let mut chosen: Vec<Option<usize>> = pairs.iter().map(|levels| (!levels.is_empty()).then_some(0)).collect();
     let fits = |chosen: &[Option<usize>]| {
         let sizes = pairs.iter().zip(chosen).filter_map(|(levels, level)| Some(levels[(*level)?].size_bytes()));
         sizes.sum::<usize>() <= budget
     };
-    let halvings = factors(1).skip(1).flat_map(|factor| (0..pairs.len()).rev().map(move |i| (i, factor)));
-    for (i, factor) in halvings {
+    let halvings = |range: std::ops::Range<usize>| {
+        factors(1).skip(1).flat_map(move |factor| range.clone().rev().map(move |i| (i, factor)))
+    };
+    let judged = judged.min(pairs.len());
+    for (i, factor) in halvings(judged..pairs.len()).chain(halvings(0..judged)) {
         if fits(&chosen) {
             break;
         }
@@ -60,20 +63,28 @@ mod tests {
         }
     }
 
-    fn chosen(budget: usize) -> Vec<u32> {
+    fn chosen(judged: usize, budget: usize) -> Vec<u32> {
         let pairs = (0..3).map(|_| factors(1).map(fake).collect()).collect();
-        fit(pairs, budget).iter().map(|pair| pair.as_ref().map_or(0, |pair| pair.factor)).collect()
+        fit(pairs, judged, budget).iter().map(|pair| pair.as_ref().map_or(0, |pair| pair.factor)).collect()
     }
 
     #[test]
     fn the_last_give_way_first() {
-        assert_eq!(chosen(192_000), [1, 1, 1]);
-        assert_eq!(chosen(191_999), [1, 1, 2]);
-        assert_eq!(chosen(100_000), [1, 2, 2]);
-        assert_eq!(chosen(47_999), [2, 2, 4]);
-        assert_eq!(chosen(3000), [8, 8, 8]);
-        assert_eq!(chosen(2999), [8, 8, 0]);
-        assert_eq!(chosen(0), [0, 0, 0]);
+        assert_eq!(chosen(3, 192_000), [1, 1, 1]);
+        assert_eq!(chosen(3, 191_999), [1, 1, 2]);
+        assert_eq!(chosen(3, 100_000), [1, 2, 2]);
+        assert_eq!(chosen(3, 47_999), [2, 2, 4]);
+        assert_eq!(chosen(3, 3000), [8, 8, 8]);
+        assert_eq!(chosen(3, 2999), [8, 8, 0]);
+        assert_eq!(chosen(3, 0), [0, 0, 0]);
+    }
+
+    #[test]
+    fn what_is_not_judged_gives_way_before_what_is() {
+        assert_eq!(chosen(1, 100_000), [1, 2, 2]);
+        assert_eq!(chosen(1, 66_000), [1, 8, 8]);
+        assert_eq!(chosen(1, 65_999), [2, 8, 8]);
+        assert_eq!(chosen(9, 100_000), [1, 2, 2]);
     }
 
     #[test]

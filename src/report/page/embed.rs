@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::PageImage;
 use super::codes::{code_of_difference, code_of_display, code_of_radiance, difference_scale};
-use super::pack::pack;
+use super::pack::{cost, pack};
 use super::shrink::{Size, mean_of_blocks, peak_of_blocks};
 use crate::math::color::luminance;
 
@@ -47,18 +47,16 @@ impl Embedded {
             let values = peak_of_blocks(difference, whole, factor);
             vec![values.into_par_iter().map(|value| code_of_difference(f64::from(value), scale)).collect()]
         };
-        let jobs: [Box<dyn Fn() -> Vec<Vec<i16>> + Sync>; 4] = [
-            Box::new(|| base.clone()),
-            Box::new(|| candidate.clone()),
-            Box::new(|| relative(&candidate, &base)),
-            Box::new(difference),
-        ];
-        let packed: io::Result<Vec<String>> =
-            jobs.into_par_iter().map(|planes| pack(&planes(), size.width as usize)).collect();
-        let [base, absolute, relative, difference] =
-            <[String; 4]>::try_from(packed?).map_err(|_| io::Error::other("four jobs gave another number of texts"))?;
-        let is_candidate_relative = relative.len() < absolute.len();
-        let candidate = if is_candidate_relative { relative } else { absolute };
+        let width = size.width as usize;
+        let relative = relative(&candidate, &base);
+        let (of_relative, of_absolute) = rayon::join(|| cost(&relative, width), || cost(&candidate, width));
+        let is_candidate_relative = of_relative < of_absolute;
+        let candidate = if is_candidate_relative { relative } else { candidate };
+        let (base, (candidate, difference)) = rayon::join(
+            || pack(&base, width),
+            || rayon::join(|| pack(&candidate, width), || pack(&difference(), width)),
+        );
+        let (base, candidate, difference) = (base?, candidate?, difference?);
         Ok(Embedded { factor, size, base, candidate, is_candidate_relative, difference, scale })
     }
 
@@ -160,6 +158,7 @@ pub(super) mod tests {
             candidate: Cow::Owned(candidate),
             exposure_ev: 0.5,
             is_display_referred: false,
+            is_judged: true,
             is_compared: None,
             figures: Vec::new(),
             worst_pixel: Some([3, 4]),

@@ -49,6 +49,7 @@ struct EmbeddedView {
 /// after the other.
 #[derive(Debug)]
 pub struct PackedImage {
+    is_judged: bool,
     view: ImageView,
     /// Finest resolution first.
     levels: Vec<Embedded>,
@@ -71,18 +72,20 @@ impl PackedImage {
         let view = view(image, &difference, colormap, still::width_for(pairs))?;
         let embed = |factor| Embedded::new(image, &difference, colormap.range()[1], factor);
         let levels = budget::factors(finest_factor(image.size())).map(embed).collect::<Result<_, _>>()?;
-        Ok(PackedImage { view, levels })
+        Ok(PackedImage { is_judged: image.is_judged, view, levels })
     }
 }
 
-/// All pairs, in the room that a page has.
-pub fn images(images: Vec<PackedImage>) -> Vec<ImageView> {
+/// All pairs, those that decide first, in the room that a page has.
+pub fn images(mut images: Vec<PackedImage>) -> Vec<ImageView> {
+    images.sort_by_key(|image| !image.is_judged);
+    let judged = images.iter().filter(|image| image.is_judged).count();
     let (mut views, levels): (Vec<ImageView>, Vec<Vec<Embedded>>) =
         images.into_iter().map(|image| (image.view, image.levels)).unzip();
     let stills =
         |view: &ImageView| view.base.len() + view.candidate.len() + view.difference.len() + 2 * view.legend.len();
     let room = budget::PICTURES_BYTES.saturating_sub(views.iter().map(stills).sum());
-    for (view, embedded) in views.iter_mut().zip(budget::fit(levels, room)) {
+    for (view, embedded) in views.iter_mut().zip(budget::fit(levels, judged, room)) {
         view.embedded = embedded.map(|embedded| {
             let Embedded {
                 factor,

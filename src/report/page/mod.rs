@@ -22,6 +22,7 @@ use glam::Vec3;
 use minijinja::{Environment, context};
 use thiserror::Error;
 
+use super::diff::Command;
 use super::diff::gate::Gate;
 use shrink::Size;
 
@@ -37,7 +38,7 @@ pub struct Page<'a> {
     pub sides: [Side; 2],
     /// In any order.
     pub gates: &'a [Gate],
-    /// In order of importance: where the page would become too large, the last ones lose pixels first.
+    /// Where the page would become too large, those that are not judged lose pixels first, and of these the last ones.
     pub images: Vec<PackedImage>,
     /// One for each pair of probe files.
     pub probes: Vec<ProbeComparison>,
@@ -47,7 +48,7 @@ pub struct Page<'a> {
     pub added: Vec<String>,
     /// Items that only the base has.
     pub missing: Vec<String>,
-    pub commands: Vec<Command>,
+    pub commands: &'a [Command],
     pub notes: Vec<String>,
 }
 
@@ -81,6 +82,8 @@ pub struct PageImage<'a> {
     pub exposure_ev: f32,
     /// A PNG: it is shown as it is, without exposure.
     pub is_display_referred: bool,
+    /// Whether it decides.
+    pub is_judged: bool,
     /// Which pixels are compared; `None`: all.
     pub is_compared: Option<&'a [bool]>,
     pub figures: Vec<Figure>,
@@ -155,14 +158,6 @@ pub struct Histogram {
 pub struct Plot {
     pub title: String,
     pub svg: String,
-}
-
-/// A line for a shell.
-#[derive(Debug, Clone)]
-pub struct Command {
-    /// Such as "bake the base".
-    pub purpose: String,
-    pub line: String,
 }
 
 /// The page could not be made.
@@ -276,7 +271,7 @@ mod tests {
             plots: vec![Plot { title: text.clone(), svg: format!("<svg>{text}</svg>") }],
             added: vec![text.clone()],
             missing: vec![text.clone()],
-            commands: vec![Command { purpose: text.clone(), line: text.clone() }],
+            commands: &[Command { purpose: text.clone(), line: text.clone() }],
             notes: vec![text],
         };
         render(page).unwrap()

@@ -32,6 +32,12 @@ pub fn pack(planes: &[Vec<i16>], width: usize) -> io::Result<String> {
     Ok(STANDARD.encode(encoder.finish()?))
 }
 
+/// About how much planes take when packed, in bits, for comparing them at a tenth of the time: of residuals in Elias' γ code.
+pub fn cost(planes: &[Vec<i16>], width: usize) -> u64 {
+    let bits = |residual: u16| u64::from(2 * (u32::from(residual) + 1).ilog2() + 1);
+    planes.iter().flat_map(|plane| residuals(plane, width)).map(bits).sum()
+}
+
 fn residuals(plane: &[i16], width: usize) -> Vec<u16> {
     let residual = |(i, &code): (usize, &i16)| {
         let residual = code.wrapping_sub(predict(plane, width, i));
@@ -94,6 +100,15 @@ mod tests {
             prop_assert_eq!(unpack(&text, 2, width, 12 / width), Some(planes));
             prop_assert_eq!(unpack(&text, 3, width, 12 / width), None);
         }
+    }
+
+    #[test]
+    fn what_costs_less_packs_smaller() {
+        // Noise of 2 and of 200 codes.
+        let noise = |span: i64| -> Vec<i16> { (0..4096_i64).map(|i| (i * i * 7919 % 10_007 % span) as i16).collect() };
+        let [fine, coarse] = [2, 200].map(|span| vec![noise(span)]);
+        assert!(2 * cost(&fine, 64) < cost(&coarse, 64));
+        assert!(2 * pack(&fine, 64).unwrap().len() < pack(&coarse, 64).unwrap().len());
     }
 
     #[test]

@@ -8,7 +8,7 @@ only_help "usage: scripts/diff_power.sh
 
 Bakes and renders scenes at a spacing each, fine and far too coarse, with the seeds 0 to 20. Compares neighbours: twenty pairs that
 differ in their seed only. Then bakes with the lamps some percent brighter, and looks for the least change that is caught in 19 of
-20 pairs: with another seed on each side, and with the same. RUNS="cornell:0.25 office:1" chooses scenes and spacings (m).
+20 pairs: with another seed on each side, and with the same. RUNS='cornell:0.25 office:1' chooses scenes and spacings (m).
 LIGHTPROBE names a binary to use instead of building one." "$@"
 
 provide_lightprobe

@@ -11,11 +11,11 @@ use crate::output::{self, Named, check_folder, check_outputs, create_folder, wri
 use crate::report::diff::mask::Mask;
 use crate::report::diff::shown::page as page_of;
 use crate::report::diff::thresholds::Thresholds;
-use crate::report::diff::words::{in_unit, margin, outcome};
+use crate::report::diff::words::{in_unit, margin, of_side, outcome};
 use crate::report::diff::{Compared, DiffReport, Request, compare, junit, markdown};
 use crate::report::header::command_line_but;
+use crate::report::page;
 use crate::report::table::{Column, Table};
-use crate::report::{format, page};
 
 /// Files that the folder gets besides the difference maps.
 const JSON: &str = "diff.json";
@@ -120,13 +120,12 @@ fn print(args: &DiffArgs, console: &Console, report: &DiffReport) -> Result<()> 
     let times = report.gates.iter().filter(|g| !g.is_judged());
     let listed = failing.chain(passing.clone().take(CLOSEST)).chain(times);
     for gate in listed {
-        let number = |value| format::or_undefined(value, |v| format::significant(v, 4));
         table.push([
             outcome(gate).to_owned(),
             gate.name.clone(),
             gate.item.clone(),
-            number(gate.base),
-            number(gate.candidate),
+            of_side(gate.base, gate.unit),
+            of_side(gate.candidate, gate.unit),
             in_unit(gate.value, gate.unit),
             in_unit(gate.threshold, gate.unit),
             margin(gate),

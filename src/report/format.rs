@@ -80,7 +80,10 @@ pub fn with_error(value: f64, error: Option<f64>) -> String {
     let decimals = decimals.min(most).max(0) as usize;
     // What is below the last digit shown is rounded up to it: an error of 0 would be a lie.
     let error = error.max(10_f64.powi(-(decimals as i32)));
-    format!("{value:.decimals$} ± {error:.decimals$}")
+    let value = format!("{value:.decimals$}");
+    // What rounds to 0 has no sign.
+    let is_zero = value.bytes().all(|c| matches!(c, b'-' | b'0' | b'.'));
+    format!("{} ± {error:.decimals$}", if is_zero { value.trim_start_matches('-') } else { &value })
 }
 
 /// A count with its thousands set apart by thin gaps: 1234567 gives "1 234 567".
@@ -163,6 +166,7 @@ mod tests {
         let cases = [
             (12.3456, Some(0.1234), "12.35 ± 0.12"),
             (0.0, Some(0.5), "0.00 ± 0.50"),
+            (-0.001, Some(0.5), "0.00 ± 0.50"),
             (1234.5, Some(56.0), "1234 ± 56"),
             (2.34567, Some(0.000_01), "2.3457 ± 0.0001"),
             (2.0e-9, Some(1.0e-10), "2.00e-9 ± 1.0e-10"),

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::DiffReport;
 use super::gate::Gate;
-use super::words::{in_unit, margin, outcome};
+use super::words::{in_unit, margin, of_side, outcome};
 use crate::report::format;
 
 /// GitHub takes comments of 65,536 characters; this leaves room for what a job writes around it.
@@ -75,7 +75,6 @@ pub fn text(report: &DiffReport) -> String {
 
 fn rows(out: &mut String, gates: &[&Gate]) {
     for gate in gates.iter().take(MOST_ROWS) {
-        let number = |value| format::or_undefined(value, |v| format::significant(v, 4));
         let error = gate.standard_error.filter(|_| gate.value.is_some());
         let error = error.map_or(String::new(), |e| format!(" ± {}", format::significant(e, 2)));
         let _ = writeln!(
@@ -84,8 +83,8 @@ fn rows(out: &mut String, gates: &[&Gate]) {
             outcome(gate),
             code(&gate.name),
             cell(&gate.item),
-            number(gate.base),
-            number(gate.candidate),
+            of_side(gate.base, gate.unit),
+            of_side(gate.candidate, gate.unit),
             in_unit(gate.value, gate.unit),
             in_unit(gate.threshold, gate.unit),
             margin(gate),

@@ -193,15 +193,18 @@ fn gate(gate: &Gate) -> GateView {
         (true, false) if gate.threshold.is_none() => ("shown", 3),
         (true, false) => ("pass", 2),
     };
-    let plain = |value: Option<f64>| cell(value, number);
+    let side = |value: Option<f64>| match gate.unit {
+        words::BYTES => Cell { text: words::of_side(value, gate.unit), raw: finite(value) },
+        _ => cell(value, number),
+    };
     let margin = gate.margin.filter(|margin| margin.is_finite());
     GateView {
         name: visible(&gate.name),
         item: visible(&gate.item),
         state,
         rank,
-        base: plain(gate.base),
-        candidate: plain(gate.candidate),
+        base: side(gate.base),
+        candidate: side(gate.candidate),
         value: Cell { text: with_unit(gate.value, gate.standard_error, gate.unit), raw: finite(gate.value) },
         threshold: Cell { text: threshold(gate), raw: finite(gate.threshold) },
         margin: Cell { text: words::margin(gate), raw: margin },
@@ -248,8 +251,7 @@ fn with_unit(value: Option<f64>, standard_error: Option<f64>, unit: &str) -> Str
     let Some(value) = value else { return format::UNDEFINED.to_owned() };
     match unit {
         "s" => format::seconds(value),
-        "bytes" | "B" if value < 0.0 => format!("-{}", format::bytes(-value as u64)),
-        "bytes" | "B" => format::bytes(value as u64),
+        "bytes" | words::BYTES => words::in_unit(Some(value), words::BYTES),
         _ => {
             let number = match standard_error {
                 Some(_) => format::with_error(value, standard_error),

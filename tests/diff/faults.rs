@@ -75,9 +75,30 @@ fn noise_between_seeds_passes() {
     }
 }
 
+/// Few probes, and few that light what a picture shows: the mean of a picture may change by percents, and single probes by half.
+#[test]
+fn noise_between_seeds_passes_where_it_is_large() {
+    let folder = Folder::new();
+    for (name, spacing) in [("courtyard", 4), ("two_rooms_sealed", 2), ("office", 2)] {
+        let bake = |seed: u32| {
+            let words = format!("--set grid.spacing_m={spacing} --seed {seed}");
+            make(&folder, &format!("{name}{seed}"), &scene(name), &words)
+        };
+        let (base, other) = (bake(0), bake(1));
+        passes(&folder, &base.run, &other.run, &[]);
+        passes(&folder, &base.probes, &other.probes, &[]);
+        passes(&folder, &base.report, &other.report, &[]);
+    }
+}
+
 #[test]
 fn visibility_off() {
     bake_fault("--set query.visibility=none", ["leak.fraction", "probes.visibility", "irradiance.energy"]);
+}
+
+#[test]
+fn visibility_off_in_spite_of_noise() {
+    bake_fault("--set query.visibility=none --seed 5", ["leak.fraction", "probes.visibility", "irradiance.energy"]);
 }
 
 #[test]

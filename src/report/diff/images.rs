@@ -131,8 +131,8 @@ pub struct Compared {
 pub struct Unevenness {
     /// Of the base's mean.
     pub share: f64,
-    /// That share of it, in the picture's unit.
-    pub absolute: f64,
+    /// The base's mean.
+    pub mean: f64,
 }
 
 /// Refuses pictures that cannot be compared, by their headers. `kept`: bytes that pairs before this one leave in memory; returned
@@ -281,7 +281,7 @@ fn compare_layer(
     if pair.judged {
         compared.findings.extend(findings(&item, &report, &sums, &blocks, &used, [&base, &candidate], pair.noise));
         if layer == LIGHT[1] {
-            let of_mean = |(share, mean)| Unevenness { share, absolute: share * mean };
+            let of_mean = |(share, mean)| Unevenness { share, mean };
             compared.unevenness = sums.unevenness.zip(report.mean_base).map(of_mean);
         }
     }

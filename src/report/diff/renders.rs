@@ -5,14 +5,15 @@ use serde_json::Value;
 use super::figures::{Compared, How, Rule, apply_all, number, rule, scenes, side_by_side, storage};
 use super::gate::Finding;
 use super::images::{Unevenness, join};
-use super::ratio::OF_UNEVENNESS;
+use super::ratio::error_between_seeds;
 
 /// The method that decides: the others are there to compare it with.
 const JUDGED_METHOD: &str = "visibility_on";
 
-/// Standard error of a leak's change between seeds, over the unevenness of the picture's light: the largest change was 0.19 of it, and
-/// three standard errors are 0.3.
+/// Standard error of a leak's change between seeds, over the unevenness of the picture's light: the largest change was 0.25 of it, and
+/// three standard errors are 0.3. A leak makes light uneven too, so that there is a most.
 const LEAK: f64 = 0.1;
+const MOST_LEAK: f64 = 0.02;
 
 /// Of each method.
 const METHOD_RULES: &[Rule] = &[
@@ -76,7 +77,7 @@ pub fn renders(item: &str, base: &Value, candidate: &Value, unevenness: Option<U
         findings.extend(apply_all(ERROR_RULES, &format!("{name}{suffix}"), [&b[key], &c[key]]));
     }
     if let Some(unevenness) = unevenness {
-        findings = findings.into_iter().map(|found| with_noise(found, unevenness, number(b, "error.rmse"))).collect();
+        findings = findings.into_iter().map(|found| with_noise(found, unevenness)).collect();
     }
     let peak = rule("peak_memory_bytes", "memory.peak", How::Increase, "B", "Largest memory of the render.");
     findings.extend(apply_all(&[peak], item, [base, candidate]));
@@ -84,16 +85,14 @@ pub fn renders(item: &str, base: &Value, candidate: &Value, unevenness: Option<U
     Compared { figures: side_by_side(item, base, candidate), findings }
 }
 
-/// Adds what the probes' noise does to a figure of all of a picture. `rmse`: of the base, against its reference.
-fn with_noise(found: Finding, unevenness: Unevenness, rmse: Option<f64>) -> Finding {
+/// Adds what the probes' noise does to a figure of all of a picture.
+fn with_noise(found: Finding, unevenness: Unevenness) -> Finding {
     let noise = match found.name {
-        "leak.light" | "leak.dark" | "leak.fraction" | "leak.dark_region" | "leak.baked" => LEAK * unevenness.share,
-        // Between two pictures no error differs by more than these do.
-        "error.mae" | "error.rmse" | "error.bias" => OF_UNEVENNESS * unevenness.absolute,
-        "error.psnr" => match rmse.filter(|rmse| *rmse > 0.0) {
-            Some(rmse) => 20.0 / std::f64::consts::LN_10 * OF_UNEVENNESS * unevenness.absolute / rmse,
-            None => return found,
-        },
+        "leak.light" | "leak.dark" | "leak.fraction" | "leak.dark_region" | "leak.baked" => {
+            (LEAK * unevenness.share).min(MOST_LEAK)
+        }
+        // It changes as the mean does.
+        "error.bias" => error_between_seeds(unevenness.share) * unevenness.mean,
         _ => return found,
     };
     let error = found.standard_error.unwrap_or(0.0).hypot(noise);

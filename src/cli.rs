@@ -19,7 +19,7 @@ pub struct Cli {
 
 #[derive(Debug, Args)]
 pub struct OutputFlags {
-    /// Print errors only.
+    /// Print no warnings and draw no progress bars.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
     /// Print what the program decides and how long it takes.

@@ -22,7 +22,7 @@ fn main() -> ExitCode {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::BeyondThresholds) => ExitCode::from(EXIT_BEYOND_THRESHOLDS),
         Err(error) => {
-            eprintln!("error: {error:#}");
+            commands::tell(format!("error: {error:#}"));
             ExitCode::from(EXIT_ERROR)
         }
     }
@@ -33,7 +33,7 @@ fn print(message: &clap::Error) -> ExitCode {
     let printed = message.print().and_then(|()| std::io::stdout().flush());
     match printed {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-            eprintln!("error: cannot write to standard output: {error}");
+            commands::tell(format!("error: cannot write to standard output: {error}"));
             ExitCode::from(EXIT_ERROR)
         }
         _ if message.use_stderr() => ExitCode::from(EXIT_ERROR),

@@ -45,12 +45,13 @@ pub fn run(args: &DiffArgs, console: &Console) -> Result<Outcome> {
     let mut compared =
         compare(&request, |item| console.say(format!("comparing {}", if item.is_empty() { "the two" } else { item })))?;
     write(args, &mut compared)?;
-    print(args, console, &compared.report)?;
     if args.update_baseline {
         output::replace(&args.base, &args.candidate)?;
-        console.warn(format!("{} is now what {} was", args.base.display(), args.candidate.display()));
+        console.note(format!("{} is now what {} was", args.base.display(), args.candidate.display()));
+        print(args, console, &compared.report)?;
         return Ok(Outcome::Done);
     }
+    print(args, console, &compared.report)?;
     Ok(if compared.report.verdict.passed { Outcome::Done } else { Outcome::BeyondThresholds })
 }
 

@@ -38,23 +38,36 @@ impl Console {
 
     pub fn warn(&self, message: impl AsRef<str>) {
         if !self.quiet {
-            eprintln!("warning: {}", message.as_ref());
+            tell(format!("warning: {}", message.as_ref()));
         }
     }
 
     pub fn say(&self, message: impl AsRef<str>) {
         if self.verbose {
-            eprintln!("{}", message.as_ref());
+            tell(message);
         }
     }
 
-    /// Prints a result. A reader that has gone away (`| head`) is no error.
+    /// What was done, for people: on standard error, as results go to standard output.
+    pub fn note(&self, message: impl AsRef<str>) {
+        if !self.quiet {
+            tell(message);
+        }
+    }
+
+    /// Prints a result. A reader that has gone away (`| head`) is no error, and changes nothing of what is done.
     pub fn print(&self, text: &str) -> Result<()> {
         match writeln!(std::io::stdout().lock(), "{}", text.trim_end()) {
-            Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => std::process::exit(0),
+            Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
             done => done.context("cannot write to standard output"),
         }
     }
+}
+
+/// A line on standard error, whether or not anyone reads it.
+pub fn tell(message: impl AsRef<str>) {
+    // Nobody is left to be told of it.
+    let _ = writeln!(std::io::stderr().lock(), "{}", message.as_ref());
 }
 
 /// How a command ended that did its work.

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::Stdio;
 
 use glam::Vec3;
 use image::{ImageBuffer, Rgb};
@@ -144,6 +145,9 @@ fn folders_are_matched_by_name() {
     assert_eq!(names, ["added", "missing"]);
     assert_eq!((&found["added"], &found["missing"]), (&json!(["new.exr"]), &json!(["gone.exr"])));
     assert_eq!(found["images"][0]["item"], "x/a.exr");
+    // A link back to where it lies adds nothing.
+    std::os::unix::fs::symlink(".", at("base/x/loop")).unwrap();
+    assert_eq!(report(&diff(&folder, &at("base"), &at("candidate"), &[])).1["missing"], json!(["gone.exr"]));
     refused_alone(&at("base/x"), &at("candidate"));
 }
 
@@ -169,10 +173,41 @@ fn masks_choose_pixels() {
     let right = mask("right.png", &|x| if x < 8 { 0 } else { 255 }, 16);
     let (code, found) = report(&diff(&folder, &a, &b, &["--mask", text(&right)]));
     assert_eq!((code, &found["images"][0]["pixels"]), (Some(0), &json!(64)));
+    let side = folder.write("a.json", bake_report("lightprobe-bake/1"));
+    let message = one_error(&diff(&folder, &side, &side, &["--mask", text(&right)]));
+    assert!(message.contains("no picture is compared"), "{message}");
     for (path, word) in [(mask("small.png", &|_| 255, 8), "one size"), (mask("black.png", &|_| 0, 16), "no white")] {
         let message = one_error(&diff(&folder, &a, &b, &["--mask", text(&path)]));
         assert!(message.contains(word) && message.contains(text(&path)), "{message}");
     }
+}
+
+#[test]
+fn the_verdict_does_not_depend_on_readers() {
+    let folder = Folder::new();
+    let up = |scale: f32| exr(&folder, &format!("{scale}.exr"), &picture(32, 18, scale));
+    let (base, candidate, out) = (up(1.0), up(2.0), folder.path().join("out"));
+    let unread = |more: &[&str]| {
+        let arguments = ["diff-report", text(&base), text(&candidate), "-o", text(&out)];
+        let mut command = command();
+        let command = command.args(arguments).args(more).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        drop((child.stdout.take(), child.stderr.take()));
+        child.wait().unwrap().code()
+    };
+    assert_eq!(unread(&[]), Some(1));
+    assert_eq!(unread(&["--update-baseline"]), Some(0));
+    assert_eq!(fs::read(&base).unwrap(), fs::read(&candidate).unwrap());
+    assert_eq!(unread(&["--thresholds", "missing.ron"]), Some(2));
+}
+
+#[test]
+fn nothing_to_judge_is_no_pass() {
+    let folder = Folder::new();
+    let light = exr(&folder, "light.exr", &picture(8, 8, 1.0));
+    let dark = exr(&folder, "nan.exr", &picture(8, 8, f32::NAN));
+    refused(&folder, &dark, &dark, &["nan.exr", "nothing to judge"]);
+    assert!(failing(&report(&diff(&folder, &light, &dark, &[])).1).contains(&"image.non_finite".to_owned()));
 }
 
 #[test]

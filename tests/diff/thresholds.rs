@@ -26,6 +26,20 @@ fn times_are_judged_only_when_asked() {
 }
 
 #[test]
+fn exceptions_for_nothing_are_told() {
+    let folder = Folder::new();
+    let side = bake_report(&folder, "a.json", 1.0);
+    let file = |item: &str| {
+        let text = format!("(exceptions: [(item: \"{item}\", gate: \"time.*\", limit: (relative: 9))])");
+        folder.write("exceptions.ron", text)
+    };
+    let notes =
+        |item: &str| report(&diff(&folder, &side, &side, &["--thresholds", text(&file(item))])).1["notes"].to_string();
+    assert!(notes("bkae").contains("item bkae, gate time.* fits no gate"));
+    assert!(!notes("*").contains("fits no gate"));
+}
+
+#[test]
 fn mistakes_are_refused() {
     let folder = Folder::new();
     let side = bake_report(&folder, "a.json", 1.0);

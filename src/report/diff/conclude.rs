@@ -6,6 +6,7 @@ use super::config_changes::config_changes;
 use super::gate::{self, Finding, Gate};
 use super::images::ImageReport;
 use super::sides::Side;
+use super::thresholds::Exception;
 use super::{About, Command, Compared, DiffReport, Found, Request, SCHEMA, SideReport, Verdict};
 use crate::image::Picture8;
 
@@ -45,6 +46,9 @@ pub(super) fn conclude(request: &Request, sides: &[Side; 2], mut found: Found) -
             true => format!("Both sides have the seed {a}: without any change their noise would be the same."),
             false => format!("The seeds are {a} and {b}: the sides differ by their noise at least."),
         });
+    }
+    for Exception { item, gate, .. } in request.thresholds.without_effect(&gates) {
+        notes.push(format!("The exception for item {item}, gate {gate} fits no gate of this comparison."));
     }
     let mut commands = vec![Command { purpose: "compare".to_owned(), line: request.command_line.clone() }];
     for (about, side) in found.about.iter().zip(sides) {

@@ -8,7 +8,7 @@ use super::DiffError;
 use super::gate::{Direction, Finding};
 use super::images::{ImageReport, Pair, Sums};
 use super::noise::Noise;
-use super::ratio::{Part, change, error_between_seeds};
+use super::ratio::{OF_UNEVENNESS, Part, change};
 use crate::image::{LayeredImage, Picture};
 
 /// Light below this share of the mean does not count as a pixel's own.
@@ -18,7 +18,7 @@ const DARK_SHARE: f64 = 0.05;
 const CHANGED_SHARE: f64 = 0.5;
 
 /// What the probes that many pixels share do to the noise of a picture's mean, beyond what its blocks show. Enough where probes
-/// stand close; where few light the picture, [`error_between_seeds`] is.
+/// stand close; where few light the picture, [`OF_UNEVENNESS`] is.
 const SHARED_PROBES: f64 = 2.0;
 
 /// By how much albedo may differ, and the components of a normal, and depth as a share of itself, before a pixel shows
@@ -60,9 +60,8 @@ pub(super) fn findings(
     let changed = (0..used.len()).filter(|i| used[*i]).filter(is_changed).count();
     let share = (sums.pixels > 0).then(|| 100.0 * changed as f64 / sums.pixels as f64);
     let of_blocks = whole.and_then(|w| w.standard_error).map(|error| SHARED_PROBES * error);
-    let of_unevenness =
-        sums.unevenness.filter(|_| noise == Noise::Other).map(|share| 100.0 * error_between_seeds(share));
-    let mean_error = of_blocks.into_iter().chain(of_unevenness).reduce(f64::max);
+    let of_unevenness = sums.unevenness.filter(|_| noise == Noise::Other).map(|share| 100.0 * OF_UNEVENNESS * share);
+    let mean_error = of_blocks.into_iter().chain(of_unevenness).reduce(f64::max).map(|error| noise.at_most(error));
     let non_finite = [sums.non_finite[0] as f64, sums.non_finite[1] as f64].map(Some);
     let mut findings = vec![
         Finding::difference(

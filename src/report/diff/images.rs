@@ -266,6 +266,10 @@ fn compare_layer(
     let compared_pixels = (0..used.len()).filter(|i| used[*i]);
     sums.unevenness = unevenness(compared_pixels.map(|i| [light(&base, i), light(&candidate, i)]));
     let exposure_ev = (!is_display).then(|| pair.exposure_ev.unwrap_or_else(|| base.auto_exposure_ev()));
+    if sums.pixels == 0 && sums.non_finite[1] <= sums.non_finite[0] {
+        let what = "no pixel is finite on both sides and counts; there is nothing to judge".to_owned();
+        return Err(DiffError::Incomparable { base: pair.base.clone(), candidate: pair.candidate.clone(), what });
+    }
     let item = if is_named { join(&pair.item, layer) } else { pair.item.clone() };
     let unit = match layer {
         _ if is_display => "",

@@ -189,6 +189,11 @@ struct About {
 pub fn compare(request: &Request, mut on_item: impl FnMut(&str)) -> Result<Compared, DiffError> {
     let sides = [Side::open(request.base)?, Side::open(request.candidate)?];
     let pairs = pair_up(&sides)?;
+    let has_pictures = |item: &Item| matches!(item, Item::Render { .. } | Item::Image(_));
+    if let (Some(mask), false) = (request.mask, pairs.both.iter().any(|(_, base, _)| has_pictures(base))) {
+        let what = "no picture is compared; leave it out, or compare renders or images".to_owned();
+        return Err(DiffError::Mask { path: mask.path.clone(), what });
+    }
     // All that headers and reports tell is said before the work.
     let mut kept = 0.0;
     for (_, base, candidate) in &pairs.both {

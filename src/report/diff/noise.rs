@@ -44,6 +44,18 @@ impl Noise {
         }
     }
 
+    /// A standard error of a mean, percent, as estimated from how unequally its parts changed, but no more than noise makes it. What is
+    /// broken is uneven too, and must not excuse itself: with the same random numbers three of it are a percent at most; with others
+    /// 21 %, where the largest change of a mean between seeds was 18 %.
+    pub fn at_most(self, error: f64) -> f64 {
+        error.min(if self == Noise::Same { 1.0 / 3.0 } else { 7.0 })
+    }
+
+    /// The same of the noise of single probes: between seeds it was 13 % in the worst scene.
+    pub fn of_probe_at_most(self, error: f64) -> f64 {
+        error.min(if self == Noise::Same { 1.0 } else { 14.0 })
+    }
+
     fn and(self, other: Noise) -> Noise {
         match (self, other) {
             (Noise::Other, _) | (_, Noise::Other) => Noise::Other,

@@ -239,7 +239,7 @@ fn compare_files(item: &str, base_file: &ProbeFile, candidate_file: &ProbeFile) 
         }
         .with_error(whole.and_then(|w| w.standard_error)),
     );
-    findings.extend(light(item, base, &rows, rms, mean_base.max(mean_candidate)));
+    findings.extend(light(item, base, &rows, rms, mean_base.max(mean_candidate), noise));
     findings.extend(distances(item, base, &rows));
     rows.sort_by(|a, b| b.irradiance_difference_relative.total_cmp(&a.irradiance_difference_relative));
     let compared = rows.len();
@@ -293,11 +293,11 @@ fn whole(volume: &Volume, rows: &[ProbeRow], noise: Noise) -> Option<Change> {
         (Some(of_blocks), Some(of_probes)) if noise == Noise::Other => Some(of_blocks.max(OF_PROBES * of_probes)),
         (of_blocks, of_probes) => of_blocks.or(of_probes),
     };
-    Some(Change { standard_error, ..found })
+    Some(Change { standard_error: standard_error.map(|error| noise.at_most(error)), ..found })
 }
 
 /// Findings about the light of single probes and regions.
-fn light(item: &str, volume: &Volume, rows: &[ProbeRow], rms: f64, scale: f64) -> Vec<Finding> {
+fn light(item: &str, volume: &Volume, rows: &[ProbeRow], rms: f64, scale: f64, noise: Noise) -> Vec<Finding> {
     let mut relative: Vec<f64> = rows.iter().map(|r| r.irradiance_difference_relative).collect();
     let changed = relative.iter().filter(|r| **r > CHANGED_SHARE).count();
     relative.sort_by(f64::total_cmp);
@@ -324,7 +324,7 @@ fn light(item: &str, volume: &Volume, rows: &[ProbeRow], rms: f64, scale: f64) -
             Some(100.0 * worst),
             "Largest difference of one probe relative to its own irradiance; its standard error is what the differences of the other probes let expect.",
         )
-        .with_error((lit.len() >= MIN_REGION).then_some(100.0 * tenth / TENTH_SIGMAS)),
+        .with_error((lit.len() >= MIN_REGION).then(|| noise.of_probe_at_most(100.0 * tenth / TENTH_SIGMAS))),
         Finding::percentage(
             "probes.changed",
             item,
@@ -332,8 +332,11 @@ fn light(item: &str, volume: &Volume, rows: &[ProbeRow], rms: f64, scale: f64) -
             "Share of probes whose irradiance changed by more than a quarter of its own.",
         ),
     ];
-    findings.push(match worst_region(volume, rows, scale) {
-        None => Finding::percentage("irradiance.region", item, Some(0.0), "No region changed."),
+    findings.push(match worst_region(volume, rows, scale, noise) {
+        None => {
+            let words = "No region has enough lit probes to tell its noise; the mean and single probes are judged.";
+            Finding::percentage("irradiance.region", item, None, words)
+        }
         Some(region) => {
             let place = region.place;
             let words = format!(
@@ -347,7 +350,7 @@ fn light(item: &str, volume: &Volume, rows: &[ProbeRow], rms: f64, scale: f64) -
 }
 
 /// The region whose change is largest against its own noise.
-fn worst_region(volume: &Volume, rows: &[ProbeRow], scale: f64) -> Option<Region> {
+fn worst_region(volume: &Volume, rows: &[ProbeRow], scale: f64, noise: Noise) -> Option<Region> {
     let mut members: Vec<Vec<&ProbeRow>> = vec![Vec::new(); BLOCKS.pow(3) as usize];
     for row in rows {
         members[block(volume, row)].push(row);
@@ -365,7 +368,7 @@ fn worst_region(volume: &Volume, rows: &[ProbeRow], scale: f64) -> Option<Region
         // Dark before and lit now is a change beyond all measure.
         let Some(found) = change(&parts) else { return Some(Region { percent: f64::MAX.sqrt(), error: 0.0, place }) };
         // Too few lit probes to know their noise.
-        let error = if found.percent == 0.0 { 0.0 } else { found.standard_error? };
+        let error = if found.percent == 0.0 { 0.0 } else { noise.at_most(found.standard_error?) };
         Some(Region { percent: found.percent, error, place })
     };
     // Against the error and a percent: where there is no noise the largest change counts.

@@ -77,17 +77,12 @@ pub fn effective_count(bases: impl Iterator<Item = f64>) -> f64 {
     sum * sum / squares
 }
 
-/// Standard error of a picture's mean between seeds, as a share, from the unevenness of its pixels.
+/// Standard error of a picture's mean between seeds, over the unevenness of its pixels.
 ///
 /// A lamp that one probe overestimates, or the light through one door, raises all that it lights, and neither pixels nor blocks of
 /// them show it. The largest change of a mean was 1.37 of the unevenness (1,096 pairs: 24 pictures, two layers, of 15 scenes and
-/// spacings with 72 to 3193 active probes), and three standard errors are 1.5. But what is broken is uneven too, so that there is a
-/// most: 18 % was the largest change.
-pub fn error_between_seeds(unevenness: f64) -> f64 {
-    const OF_UNEVENNESS: f64 = 0.5;
-    const MOST: f64 = 0.07;
-    (OF_UNEVENNESS * unevenness).min(MOST)
-}
+/// spacings with 72 to 3193 active probes), and three standard errors are 1.5.
+pub const OF_UNEVENNESS: f64 = 0.5;
 
 /// Fewer parts say nothing about their own spread that could be relied on.
 const MIN_PARTS: usize = 6;

@@ -5,7 +5,8 @@ use serde_json::Value;
 use super::figures::{Compared, How, Rule, apply_all, number, rule, scenes, side_by_side, storage};
 use super::gate::Finding;
 use super::images::{Unevenness, join};
-use super::ratio::error_between_seeds;
+use super::noise::Noise;
+use super::ratio::OF_UNEVENNESS;
 
 /// The method that decides: the others are there to compare it with.
 const JUDGED_METHOD: &str = "visibility_on";
@@ -92,7 +93,7 @@ fn with_noise(found: Finding, unevenness: Unevenness) -> Finding {
             (LEAK * unevenness.share).min(MOST_LEAK)
         }
         // It changes as the mean does.
-        "error.bias" => error_between_seeds(unevenness.share) * unevenness.mean,
+        "error.bias" => Noise::Other.at_most(100.0 * OF_UNEVENNESS * unevenness.share) / 100.0 * unevenness.mean,
         _ => return found,
     };
     let error = found.standard_error.unwrap_or(0.0).hypot(noise);

@@ -154,10 +154,15 @@ fn collect(path: &Path, name: &str, depth: usize, items: &mut BTreeMap<String, I
     }
     entries.sort();
     for entry in entries {
-        let Some(leaf) = entry.file_name().and_then(|n| n.to_str()).filter(|n| !n.starts_with('.')) else { continue };
-        let inner = if name.is_empty() { leaf.to_owned() } else { format!("{name}/{leaf}") };
+        let Some(leaf) = entry.file_name().map(|n| n.to_string_lossy()).filter(|n| !n.starts_with('.')) else {
+            continue;
+        };
+        let inner = if name.is_empty() { leaf.into_owned() } else { format!("{name}/{leaf}") };
         if entry.is_dir() {
-            if depth < MAX_DEPTH {
+            // A link that leads back to a folder it lies in holds nothing that is not there already.
+            let is_loop = fs::canonicalize(&entry)
+                .is_ok_and(|real| fs::canonicalize(path).is_ok_and(|here| here.starts_with(real)));
+            if depth < MAX_DEPTH && !is_loop {
                 collect(&entry, &inner, depth + 1, items)?;
             }
         } else if let Some(item) = known_file(&entry)? {

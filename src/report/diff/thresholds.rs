@@ -111,6 +111,12 @@ impl Thresholds {
         Ok(())
     }
 
+    /// Exceptions that are for none of these gates.
+    pub fn without_effect(&self, gates: &[Gate]) -> Vec<&Exception> {
+        let fits_one = |e: &Exception| gates.iter().any(|gate| fits(&e.gate, &gate.name) && fits(&e.item, &gate.item));
+        self.exceptions.iter().filter(|exception| !fits_one(exception)).collect()
+    }
+
     /// The limit of a gate for an item, and where it comes from.
     fn limit(&self, name: &str, item: &str) -> (Limit, String) {
         let exception = self.exceptions.iter().rev().find(|e| fits(&e.gate, name) && fits(&e.item, item));
@@ -200,12 +206,14 @@ fn check(limit: &Limit) -> Result<(), String> {
 
 /// Whether a pattern, in which `*` stands for any letters, is that of the whole text.
 fn fits(pattern: &str, text: &str) -> bool {
-    match pattern.split_once('*') {
-        None => pattern == text,
-        Some((start, rest)) => text.strip_prefix(start).is_some_and(|text| {
-            text.char_indices().map(|(at, _)| &text[at..]).chain([""]).any(|tail| fits(rest, tail))
-        }),
-    }
+    let Some((start, rest)) = pattern.split_once('*') else { return pattern == text };
+    let (middle, end) = rest.rsplit_once('*').unwrap_or(("", rest));
+    let inner = text.strip_prefix(start).and_then(|text| text.strip_suffix(end));
+    // Each part at its first place: a later one would leave less for those after it.
+    let after = |text: &str, part: &str| text.find(part).map(|at| at + part.len());
+    inner.is_some_and(|inner| {
+        middle.split('*').try_fold(inner, |text, part| Some(&text[after(text, part)?..])).is_some()
+    })
 }
 
 #[cfg(test)]
@@ -230,6 +238,13 @@ mod tests {
             ("leak", "leak.light", false),
             ("a*c", "ab", false),
             ("", "a", false),
+            ("*", "abc", true),
+            ("a*b*c", "axbxbc", true),
+            ("a*b*c", "axc", false),
+            ("ab*bc", "abc", false),
+            ("*é*é", "xéé", true),
+            (&"*a".repeat(40), &"a".repeat(39), false),
+            (&"*".repeat(80), "lit/visibility_on", true),
         ] {
             assert_eq!(fits(pattern, text), expected, "{pattern} {text}");
         }

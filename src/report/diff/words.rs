@@ -58,7 +58,7 @@ mod tests {
     fn bytes_are_sizes() {
         assert_eq!(in_unit(Some(-2048.0), BYTES), "-2.00 KiB");
         assert_eq!(of_side(Some(2048.0), BYTES), "2.00 KiB");
-        assert_eq!((in_unit(Some(2048.0), "%"), of_side(Some(2048.0), "%")), ("2048 %".to_owned(), "2048".to_owned()));
+        assert_eq!((in_unit(Some(2.5), "%"), of_side(Some(2.5), "%")), ("2.50 %".to_owned(), "2.500".to_owned()));
         assert_eq!(of_side(None, BYTES), format::UNDEFINED);
     }
 

@@ -140,10 +140,36 @@ pub fn sort(gates: &mut [Gate]) {
         _ if gate.is_judged() => 2,
         _ => 3,
     };
-    // What fails without a margin is undefined, and first.
-    let margin = |gate: &Gate| gate.margin.unwrap_or(f64::NEG_INFINITY);
+    // Without a margin a gate is undefined: first where it fails by that, last where there was nothing to judge.
+    let undefined = |gate: &Gate| if gate.fails() { f64::NEG_INFINITY } else { f64::INFINITY };
+    let margin = |gate: &Gate| gate.margin.unwrap_or(undefined(gate));
     gates.sort_by(|a, b| {
         let by_name = || (&a.name, &a.item).cmp(&(&b.name, &b.item));
         rank(a).cmp(&rank(b)).then(margin(a).total_cmp(&margin(b))).then_with(by_name)
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::thresholds::Thresholds;
+    use super::*;
+
+    #[test]
+    fn what_is_worst_comes_first() {
+        let thresholds = Thresholds::load(None).unwrap();
+        let gate = |item: &str, value: Option<f64>, base: Option<f64>| {
+            let found = Finding::percentage("image.rmse", item, value, "");
+            thresholds.judge(Finding { base, ..found })
+        };
+        let mut gates = vec![
+            gate("nothing to judge", None, None),
+            gate("untouched", Some(0.0), None),
+            gate("close", Some(11.0), None),
+            gate("beyond", Some(50.0), None),
+            gate("undefined on one side", None, Some(1.0)),
+        ];
+        sort(&mut gates);
+        let items: Vec<&str> = gates.iter().map(|gate| gate.item.as_str()).collect();
+        assert_eq!(items, ["undefined on one side", "beyond", "close", "untouched", "nothing to judge"]);
+    }
 }

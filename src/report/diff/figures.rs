@@ -25,6 +25,7 @@ pub struct Figure {
 }
 
 /// How a figure is judged.
+#[derive(Clone, Copy)]
 pub(super) struct Rule {
     /// Place in what is judged, such as "leak.light".
     pub(super) place: &'static str,
@@ -32,6 +33,13 @@ pub(super) struct Rule {
     how: How,
     unit: &'static str,
     explanation: &'static str,
+}
+
+impl Rule {
+    /// The same rule for a figure that stands elsewhere.
+    pub(super) fn at(self, place: &'static str) -> Rule {
+        Rule { place, ..self }
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -9,37 +9,36 @@ use super::gate::{Direction, Finding};
 use super::images::join;
 use super::noise::Noise;
 use super::ratio::widening;
+use super::renders::{ERROR_RULES, METHOD_RULES};
 use crate::report::format;
 
-/// Of each configuration's `figures`, which are over its seeds.
+/// Of each configuration's `figures`, which are over its seeds: those that a render has too, and its gates.
+const OF_RENDERS: &[(&str, &str)] = &[
+    ("leak_light", "leak.light"),
+    ("leak_dark", "leak.dark"),
+    ("leak_fraction", "leak.fraction"),
+    ("leak_unseen", "leak.unseen"),
+    ("error_mae", "error.mae"),
+    ("error_rmse", "error.rmse"),
+    ("error_relmse", "error.relmse"),
+    ("error_bias", "error.bias"),
+    ("error_flip", "error.flip"),
+    ("bytes_per_probe", "memory.bytes_per_probe"),
+    ("shade_ms", "time.shade"),
+    ("lookup_ns", "time.lookup"),
+];
+
+/// Those that a render has not.
 const RULES: &[Rule] = &[
-    rule("leak_light", "leak.light", How::Increase, "", "Light that came through walls, as a share of all."),
-    rule(
-        "leak_dark",
-        "leak.dark",
-        How::Increase,
-        "",
-        "Light that the visibility test took away by mistake, as a share of all.",
-    ),
-    rule(
-        "leak_fraction",
-        "leak.fraction",
-        How::Increase,
-        "",
-        "Share of the irradiance that came from probes not visible.",
-    ),
-    rule("leak_unseen", "leak.unseen", How::Increase, "", "Share of points that see none of their probes."),
-    rule("error_mae", "error.mae", How::Increase, "W/m²", "Mean absolute difference from the reference."),
-    rule("error_rmse", "error.rmse", How::Increase, "W/m²", "Root mean square difference from the reference."),
-    rule("error_relmse", "error.relmse", How::Increase, "", "Mean relative squared difference from the reference."),
-    rule("error_bias", "error.bias", How::Magnitude, "W/m²", "Mean difference from the reference, by size."),
-    rule("error_flip", "error.flip", How::Increase, "", "FLIP against the reference."),
-    rule("bytes_per_probe", "memory.bytes_per_probe", How::Growth, "%", "Bytes per probe at run time."),
     rule("file_bytes", "memory.file_bytes", How::Growth, "%", "Bytes of the file."),
     rule("bake_s", "time.bake", How::Growth, "%", "Time of the bake, without loading and writing."),
-    rule("shade_ms", "time.shade", How::Growth, "%", "Time of queries and shading."),
-    rule("lookup_ns", "time.lookup", How::Growth, "%", "Time of one query on one thread."),
 ];
+
+fn rules() -> impl Iterator<Item = Rule> {
+    let of_render = |gate: &str| METHOD_RULES.iter().chain(ERROR_RULES).find(|rule| rule.gate == gate);
+    let shared = OF_RENDERS.iter().filter_map(move |&(place, gate)| Some(of_render(gate)?.at(place)));
+    shared.chain(RULES.iter().copied())
+}
 
 /// Two sweeps, and the configurations that only the base or only the candidate has. The sides' errors are those of their seeds, where
 /// these are others: with the same seeds a difference is a change.
@@ -68,12 +67,12 @@ fn configuration(item: &str, sides: [&Value; 2], noise: Noise) -> Vec<Finding> {
     // With few seeds the errors themselves are hardly known.
     let freedom = runs[0].saturating_sub(1) + runs[1].saturating_sub(1);
     let factor = widening(freedom as f64);
-    let judged = RULES.iter().map(|rule| {
+    let judged = rules().map(|rule| {
         let of = |part: &str| sides.map(|side| number(side, &format!("figures.{}.{part}", rule.place)));
         let (means, [low, high]) = (of("mean"), [of("min"), of("max")]);
         let errors =
-            of("standard_error").map(|e| e.map(|e| factor * e).filter(|_| noise == Noise::Other || is_time(rule)));
-        let found = apply(rule, item, means, errors);
+            of("standard_error").map(|e| e.map(|e| factor * e).filter(|_| noise == Noise::Other || is_time(&rule)));
+        let found = apply(&rule, item, means, errors);
         if runs == [1, 1] {
             return found;
         }
@@ -121,6 +120,11 @@ mod tests {
         let (compared, apart) = sweeps("", base, candidate);
         assert!(apart.iter().all(Vec::is_empty));
         compared.findings.into_iter().find(|f| f.name == "error.rmse").unwrap()
+    }
+
+    #[test]
+    fn every_figure_has_its_rule() {
+        assert_eq!(rules().count(), OF_RENDERS.len() + RULES.len());
     }
 
     #[test]

@@ -100,9 +100,9 @@ pub struct ViewArgs {
     /// Camera by origin and target, metres in world space, and vertical field of view in degrees (60 where not given).
     #[arg(long, value_name = "ox,oy,oz,tx,ty,tz[,fov]", value_parser = LookAt::from_str, allow_hyphen_values = true)]
     pub look_at: Option<LookAt>,
-    /// Size of the pictures in pixels.
-    #[arg(long, value_name = "WxH", default_value = "640x360", value_parser = Size::from_str, allow_hyphen_values = true)]
-    pub size: Size,
+    /// PictureSize of the pictures in pixels.
+    #[arg(long, value_name = "WxH", default_value = "640x360", value_parser = PictureSize::from_str, allow_hyphen_values = true)]
+    pub size: PictureSize,
 }
 
 #[derive(Debug, Args)]
@@ -303,7 +303,7 @@ pub struct InspectArgs {
 
 /// Width and height, pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Size {
+pub struct PictureSize {
     pub width: u32,
     pub height: u32,
 }
@@ -311,15 +311,15 @@ pub struct Size {
 /// Largest side of a picture, pixels.
 const MAX_SIDE: u32 = 16_384;
 
-impl FromStr for Size {
+impl FromStr for PictureSize {
     type Err = String;
 
-    fn from_str(text: &str) -> Result<Size, String> {
+    fn from_str(text: &str) -> Result<PictureSize, String> {
         let side = |s: &str| s.parse::<u32>().ok().filter(|n| (1..=MAX_SIDE).contains(n));
         let parts = text.split_once(['x', 'X']).and_then(|(w, h)| Some((side(w)?, side(h)?)));
         let (width, height) =
             parts.ok_or_else(|| format!("write width and height as 640x360, each from 1 to {MAX_SIDE}"))?;
-        Ok(Size { width, height })
+        Ok(PictureSize { width, height })
     }
 }
 
@@ -383,8 +383,12 @@ mod tests {
 
     #[test]
     fn sizes_and_views_are_checked() {
-        assert_eq!("64x36".parse(), Ok(Size { width: 64, height: 36 }));
-        assert!("0x5".parse::<Size>().is_err() && "64".parse::<Size>().is_err() && "99999x5".parse::<Size>().is_err());
+        assert_eq!("64x36".parse(), Ok(PictureSize { width: 64, height: 36 }));
+        assert!(
+            "0x5".parse::<PictureSize>().is_err()
+                && "64".parse::<PictureSize>().is_err()
+                && "99999x5".parse::<PictureSize>().is_err()
+        );
         assert_eq!("0,1,2,3,4,5".parse::<LookAt>().unwrap().fov_y_deg, 60.0);
         for bad in ["0,1,2", "0,0,0,0,0,0", "0,1,2,3,4,5,180", "0,1,nan,3,4,5"] {
             assert!(bad.parse::<LookAt>().is_err(), "{bad}");

@@ -9,11 +9,11 @@ use crate::config::Config;
 use crate::image::LayeredImage;
 use crate::light::World;
 use crate::math::color::luminance;
+use crate::probe::Volume;
 use crate::probe::file::ProbeFile;
 use crate::probe::query::{Query, VisibilitySettings};
-use crate::probe::truth::Truth;
-use crate::probe::{Volume, layout};
-use crate::progress::Progress;
+use crate::probe::store::layout;
+use crate::probe::transport::truth::Truth;
 use crate::report::baked::{self, BakedReport};
 use crate::report::reference_layers::ReferenceLayers;
 use crate::report::render::{MethodReport, Spread};
@@ -24,6 +24,7 @@ use crate::shade::methods::{Method, exact_masks, irradiance, time_lookup, time_s
 use crate::shade::points::View;
 use crate::shade::reference::ReferenceSettings;
 use crate::shade::regions::Region;
+use crate::system::progress::Progress;
 
 /// Name in the report of probes lit by full paths, with exact visibility.
 pub const PATH_RAY: &str = "path_ray";

@@ -8,10 +8,11 @@ use serde::Serialize;
 use crate::config::{Config, PlanMode};
 use crate::light::World;
 use crate::probe::Grid;
-use crate::probe::placement::{Placement, ProbeState};
+use crate::probe::lattice::ProbeState;
+use crate::probe::place::Placement;
 use crate::probe::query::VisibilitySettings;
-use crate::probe::solver::SolverSettings;
-use crate::probe::surface_visibility::SurfaceVisibility;
+use crate::probe::store::surface::SurfaceVisibility;
+use crate::probe::transport::solver::SolverSettings;
 use crate::scene::{AlphaMode, Environment, Scene};
 
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -7,9 +7,9 @@ use std::process::Command;
 
 use glam::Vec3;
 use lightprobe::image::{ImageError, LayeredImage, Picture, Picture8};
-use lightprobe::output::write_atomically;
 use lightprobe::report::colormap::{Colormap, MISSING, Scale};
 use lightprobe::report::heatmap::{Heatmap, range_of};
+use lightprobe::system::output::write_atomically;
 use proptest::prelude::*;
 
 const WIDTH: u32 = 11;

@@ -2,15 +2,15 @@
 //! rest is small.
 
 use crate::config::Config;
-use crate::memory::{TooLittleMemory, available_bytes};
 use crate::probe::Grid;
-use crate::probe::anderson::History;
 use crate::probe::capture::ProbeCapture;
-use crate::probe::filter::{FilterSettings, Kernel};
+use crate::probe::capture::surfel::Surfel;
+use crate::probe::place::survey;
 use crate::probe::query::VisibilitySettings;
-use crate::probe::surfel::Surfel;
-use crate::probe::survey;
+use crate::probe::store::kernel::{FilterSettings, Kernel};
+use crate::probe::transport::anderson::History;
 use crate::scene::{Mesh, Scene};
+use crate::system::memory::{TooLittleMemory, available_bytes};
 
 use super::{BakeError, SURVEY_VOXELS};
 

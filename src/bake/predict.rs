@@ -8,12 +8,12 @@ use rayon::prelude::*;
 use super::memory::{EMITTED_BYTES, SURFEL_BYTES, surfels_bytes};
 use super::{Budgeted, CHUNK_BYTES, Circumstances, Prepared};
 use crate::math::fibonacci;
-use crate::memory::{TooLittleMemory, peak_memory_bytes, resident_bytes};
 use crate::probe::capture::ProbeCapture;
-use crate::probe::filter::Kernel;
-use crate::probe::map::OctahedralMaps;
-use crate::probe::solver::SolverSettings;
-use crate::probe::sweep::Sweep;
+use crate::probe::store::kernel::Kernel;
+use crate::probe::store::map::OctahedralMaps;
+use crate::probe::transport::operator::Sweep;
+use crate::probe::transport::solver::SolverSettings;
+use crate::system::memory::{TooLittleMemory, peak_memory_bytes, resident_bytes};
 use crate::trace::Ray;
 
 /// Probes traced to predict.

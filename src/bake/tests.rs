@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use serde_json::json;
 
 use super::*;
-use crate::probe::solver::SolverSettings;
-use crate::probe::sweep::{self, Field};
+use crate::probe::transport::operator::{self, Field};
+use crate::probe::transport::solver::SolverSettings;
 use crate::scene::{self, LoadOptions, Scene};
 
 #[path = "../../tests/common/mod.rs"]
@@ -116,7 +116,7 @@ fn dense(traced: &Traced) -> (DMatrix<f64>, DVector<f64>) {
     let mut matrix = DMatrix::zeros(n, n);
     for column in 0..n {
         let unit: Field = (0..n).map(|o| if o == column { Vec3::ONE } else { Vec3::ZERO }).collect();
-        sweep::store(&mut volume, &unit);
+        operator::store(&mut volume, &unit);
         let (image, _) = operator.apply(&volume, Some(&masks));
         image.iter().enumerate().for_each(|(row, e)| matrix[(row, column)] = f64::from(e.x));
     }
@@ -148,7 +148,7 @@ fn check_against_dense(scene: &Scene, config: &Config, what: &str) {
     let sweep = traced.sweep(&traced.captures);
     let settings = SolverSettings { max_sweeps: 29, ..config.solver.clone() };
     let solution = solver::solve(&sweep, &settings, &mut volume, State::default(), |_, _| {});
-    let found = sweep::field_of(&volume);
+    let found = operator::field_of(&volume);
     let worst = found.iter().zip(exact.iter()).map(|(e, x)| (f64::from(e.x) / x - 1.0).abs()).fold(0.0, f64::max);
     let estimate = solution.spectral_radius_estimate.unwrap();
     let gap = (1.0 - estimate) / (1.0 - eigenvalue);

@@ -13,16 +13,16 @@ use crate::bake::{Baked, Checkpoint, Circumstances, Prepared, prepare};
 use crate::cli::BakeArgs;
 use crate::config::{Config, presets};
 use crate::light::World;
-use crate::output::{Named, check_outputs};
 use crate::plan::Line;
-use crate::probe::checkpoint;
 use crate::probe::file::SceneRecord;
-use crate::probe::layout;
+use crate::probe::store::layout;
+use crate::probe::transport::checkpoint;
 use crate::report::bake::{BakeReport, BytesPerProbe, SCHEMA, SolverReport};
-use crate::report::format;
 use crate::report::header::Header;
 use crate::report::table::{Column, Table};
 use crate::scene::Scene;
+use crate::system::format;
+use crate::system::output::{Named, check_outputs};
 
 pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     if args.config.preset.as_deref() == Some("list") {

@@ -7,7 +7,6 @@ use anyhow::{Context, Result, bail};
 
 use super::{Console, Outcome, write_json};
 use crate::cli::DiffArgs;
-use crate::output::{self, Named, check_folder, check_outputs, create_folder, write_atomically};
 use crate::report::diff::mask::Mask;
 use crate::report::diff::shown::page as page_of;
 use crate::report::diff::thresholds::Thresholds;
@@ -16,6 +15,7 @@ use crate::report::diff::{Compared, DiffReport, Request, compare, junit, markdow
 use crate::report::header::command_line_but;
 use crate::report::page;
 use crate::report::table::{Column, Table};
+use crate::system::output::{self, Named, check_folder, check_outputs, create_folder, write_atomically};
 
 /// Files that the folder gets besides the difference maps.
 const JSON: &str = "diff.json";

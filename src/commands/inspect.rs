@@ -9,10 +9,10 @@ use serde_json::{Value, json};
 use super::{Console, tell};
 use crate::cli::InspectArgs;
 use crate::probe::file::{self, FORMAT, ProbeFile};
-use crate::probe::placement::ProbeState;
+use crate::probe::lattice::ProbeState;
 use crate::probe::{ProbeIndex, Volume};
-use crate::report::format;
 use crate::report::table::{Column, Table};
+use crate::system::format;
 
 pub fn run(args: &InspectArgs, console: &Console) -> Result<()> {
     let started = Instant::now();

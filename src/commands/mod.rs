@@ -14,12 +14,12 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 
-use crate::cli::{Cli, Command, ConfigArgs, OutputFlags, TraceArgs};
+use crate::cli::{Cli, Command, ConfigArgs, OutputFlags, PictureSize, TraceArgs};
 use crate::config::{Config, presets};
-use crate::memory::peak_memory_bytes;
-use crate::output::{Named, check_apart, write_atomically};
-use crate::progress::Progress;
 use crate::scene::{self, EnvironmentSource, LoadOptions, Scene};
+use crate::system::memory::{TooLittleMemory, check_available, peak_memory_bytes};
+use crate::system::output::{Named, check_apart, write_atomically};
+use crate::system::progress::Progress;
 
 /// How a command speaks to its user: results on standard output, all else on standard error.
 #[derive(Debug, Clone, Copy)]
@@ -150,6 +150,19 @@ fn load_scene(path: &Path, trace: &TraceArgs, config: &Config, console: &Console
         console.warn(format!("{}: {warning}", path.display()));
     }
     Ok(scene)
+}
+
+/// Refuses pictures of this size where they take more memory than there is.
+fn check_picture_memory(size: PictureSize, bytes_per_pixel: f64) -> Result<(), TooLittleMemory> {
+    let PictureSize { width, height } = size;
+    let needed = (f64::from(width) * f64::from(height) * bytes_per_pixel) as u64;
+    check_available(needed, |available| TooLittleMemory {
+        key: format!("--size {width}x{height}"),
+        what: "the pictures",
+        needed,
+        available,
+        remedy: "choose a smaller size",
+    })
 }
 
 /// Writes a report as JSON.

@@ -7,16 +7,14 @@ use anyhow::{Result, bail, ensure};
 
 use super::camera::cameras;
 use super::{
-    Console, check_apart_from, inputs, load_scene, peak_memory_bytes, resolve_config, set_threads, tell, write_json,
+    Console, check_apart_from, check_picture_memory, inputs, load_scene, peak_memory_bytes, resolve_config,
+    set_threads, tell, write_json,
 };
 use crate::cli::{ReferenceArgs, TransportName};
 use crate::light::World;
 use crate::light::bsdf::Transport;
 use crate::light::path::Strategy;
 use crate::math::blocks::BLOCK;
-use crate::memory::check_memory;
-use crate::output::{Named, check_outputs};
-use crate::report::format;
 use crate::report::header::Header;
 use crate::report::reference::{NoiseReport, Rays, ReferenceReport, ReferenceTimes, SCHEMA};
 use crate::report::table::{Column, Table};
@@ -24,6 +22,8 @@ use crate::shade::film::Noise;
 use crate::shade::points::has_blend;
 use crate::shade::reference::{ReferenceSettings, State, Tracing};
 use crate::shade::reference_file::{Identity, resume};
+use crate::system::format;
+use crate::system::output::{Named, check_outputs};
 
 /// How much work a kill may lose.
 const SAVE_INTERVAL: Duration = Duration::from_secs(60);
@@ -74,7 +74,7 @@ pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
     let Some(camera) = found.first() else { bail!("there is no camera; use --look-at") };
     let size = args.view.size;
     let layered = settings.transport == Transport::Gltf || has_blend(&world);
-    check_memory(size, if layered { LAYERED_PIXEL_BYTES } else { PIXEL_BYTES })?;
+    check_picture_memory(size, if layered { LAYERED_PIXEL_BYTES } else { PIXEL_BYTES })?;
     let identity = Identity::new(&world, camera, size.width, size.height, &settings);
     let previous = previous(args, &identity, &world, &settings, console)?;
     let (spp_resumed, rays_before) = previous.as_ref().map_or((0, 0), |p| (p.film.blocks * BLOCK, p.rays.total()));

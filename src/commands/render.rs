@@ -18,7 +18,6 @@ use crate::cli::RenderArgs;
 use crate::config::Config;
 use crate::evaluate::{BakedTruth, Comparison, PATH_RAY, Scenery, Shaded, runtime_bytes, volume_as_planned};
 use crate::light::World;
-use crate::output::{Named, create_folder};
 use crate::probe::Volume;
 use crate::probe::file::{self, ProbeFile};
 use crate::probe::query::Query;
@@ -27,6 +26,7 @@ use crate::report::render::{RenderReport, RenderTimes, SCHEMA};
 use crate::scene::{Camera, Scene};
 use crate::shade::methods::Method;
 use crate::shade::points::see;
+use crate::system::output::{Named, create_folder};
 
 /// What all cameras of a run share.
 struct Run<'a> {

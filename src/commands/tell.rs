@@ -4,14 +4,14 @@ use std::path::Path;
 
 use super::Console;
 use crate::bake::{Baked, Prepared};
-use crate::cli::{ConfigArgs, Size};
+use crate::cli::{ConfigArgs, PictureSize};
 use crate::light::sampled::RayCount;
 use crate::plan::Line;
 use crate::probe::file::ProbeFile;
-use crate::probe::placement::ProbeState;
-use crate::report::format;
+use crate::probe::lattice::ProbeState;
 use crate::report::render::RenderReport;
 use crate::scene::Scene;
+use crate::system::format;
 
 /// Where the configuration in effect comes from.
 pub fn configuration(console: &Console, args: &ConfigArgs) {
@@ -111,8 +111,8 @@ pub fn rendered(console: &Console, report: &RenderReport) {
     }
 }
 
-pub fn reference_begins(console: &Console, camera: &str, size: Size, spp: u32, spp_resumed: u32) {
-    let Size { width, height } = size;
+pub fn reference_begins(console: &Console, camera: &str, size: PictureSize, spp: u32, spp_resumed: u32) {
+    let PictureSize { width, height } = size;
     console.say(format!(
         "camera {camera}: {width}×{height} pixels, {spp} samples each, {spp_resumed} of them there already"
     ));

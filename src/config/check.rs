@@ -2,9 +2,9 @@
 
 use super::{Config, ConfigError};
 use crate::probe::capture::ReflectedLight;
-use crate::probe::grid::Bounds;
+use crate::probe::lattice::grid::Bounds;
 use crate::probe::query::{DirectionWeight, VisibilitySettings};
-use crate::probe::surface_visibility::MAX_VOXELS_PER_CELL;
+use crate::probe::store::surface::MAX_VOXELS_PER_CELL;
 
 /// Largest resolution of any octahedral map, texels per side.
 const MAX_RESOLUTION: usize = 1024;

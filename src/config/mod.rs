@@ -13,14 +13,14 @@ use std::path::{Path, PathBuf};
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
-use crate::input::read_file;
 use crate::probe::capture::CaptureSettings;
-use crate::probe::encode::EncodingSettings;
-use crate::probe::filter::FilterSettings;
-use crate::probe::grid::GridSettings;
-use crate::probe::placement::PlacementSettings;
+use crate::probe::lattice::grid::GridSettings;
+use crate::probe::place::PlacementSettings;
 use crate::probe::query::QuerySettings;
-use crate::probe::solver::SolverSettings;
+use crate::probe::store::encode::EncodingSettings;
+use crate::probe::store::kernel::FilterSettings;
+use crate::probe::transport::solver::SolverSettings;
+use crate::system::input::read_file;
 
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

@@ -87,8 +87,8 @@ fn plain(text: &str) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::probe::encode::ColorFormat;
     use crate::probe::query::VisibilitySettings;
+    use crate::probe::store::encode::ColorFormat;
 
     fn with(assignments: &[&str]) -> Result<Config, ConfigError> {
         Config::default().with_overrides(&assignments.iter().map(|s| s.to_string()).collect::<Vec<_>>())

@@ -11,7 +11,7 @@ use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use super::error::ImageError;
 use super::exr_read::read_exr_header;
 use super::layered::{BEAUTY, LayeredImage};
-use crate::input::open_file;
+use crate::system::input::open_file;
 
 /// First bytes of an OpenEXR file.
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];

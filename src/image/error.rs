@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use crate::output::OutputError;
+use crate::system::output::OutputError;
 
 /// A picture could not be read or written. Each message names the file and what to do about it.
 #[derive(Debug, Error)]

@@ -16,7 +16,7 @@ use exr::prelude::Compression;
 use rayon::prelude::*;
 
 use super::error::ImageError;
-use crate::input::open_file;
+use crate::system::input::open_file;
 
 const FORMAT: &str = "OpenEXR";
 

@@ -16,7 +16,7 @@ use glam::Vec3;
 use super::error::ImageError;
 use super::layered::{LayeredImage, STATE, TEXTS};
 use super::picture::Picture;
-use crate::output::write_atomically;
+use crate::system::output::write_atomically;
 
 /// EXR limits a channel's name to 255 bytes; this leaves room for ".R".
 const MAX_NAME_BYTES: usize = 200;

@@ -8,8 +8,8 @@ use image::{ExtendedColorType, ImageEncoder, ImageFormat, ImageReader};
 
 use super::error::ImageError;
 use super::picture::Picture8;
-use crate::input::open_file;
-use crate::output::write_atomically;
+use crate::system::input::open_file;
+use crate::system::output::write_atomically;
 
 const FORMAT: &str = "PNG";
 

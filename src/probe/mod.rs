@@ -1,29 +1,24 @@
 //! Probes: where they are, what they see, how light bounces between them, how they are stored and asked.
 //!
-//! A bake is these modules in this order: [`grid`] → [`placement`] → [`capture`] → [`solver`] → [`filter`] →
-//! [`encode`] → [`file`]; [`volume`] and [`query`] are what shading uses, and the solver with it.
+//! The folders from the ground up; each uses only those above it in this list:
+//!
+//! | folder | role |
+//! |---|---|
+//! | [`lattice`] | where probes are, and which of them count |
+//! | [`store`] | what probes hold of light and of visibility, in memory and in bits |
+//! | [`query`] | asking the probes at a point |
+//! | [`file`] | a volume as a file, and back |
+//! | [`place`] | moving probes to where they are of use, and finding out what surfaces see of them |
+//! | [`capture`] | what a probe sees |
+//! | [`transport`] | light on its way between the captured surfaces and the probes |
 
-pub mod anderson;
 pub mod capture;
-pub mod checkpoint;
-pub mod container;
-pub mod encode;
 pub mod file;
-pub mod filter;
-pub mod grid;
-pub mod layout;
-pub mod map;
-pub mod need;
-pub mod overlap;
-pub mod placement;
+pub mod lattice;
+pub mod place;
 pub mod query;
-pub mod solver;
-pub mod surface_visibility;
-pub mod surfel;
-pub mod survey;
-pub mod sweep;
-pub mod truth;
-pub mod volume;
+pub mod store;
+pub mod transport;
 
-pub use grid::{Grid, ProbeIndex};
-pub use volume::Volume;
+pub use self::lattice::{Grid, ProbeIndex};
+pub use self::store::volume::Volume;

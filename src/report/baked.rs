@@ -8,8 +8,8 @@ use super::error::terms::fold;
 use crate::math::color::luminance;
 use crate::math::octahedral::{solid_angle_density, texel_centre};
 use crate::probe::Volume;
-use crate::probe::map::interior_texel;
-use crate::probe::truth::Truth;
+use crate::probe::store::map::interior_texel;
+use crate::probe::transport::truth::Truth;
 
 /// Sums run over all texels of active probes by their solid angle, in luminance. All are shares of ΣE_path.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]

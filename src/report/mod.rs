@@ -7,7 +7,6 @@ pub mod colormap;
 pub mod diff;
 pub mod error;
 pub mod font;
-pub mod format;
 pub mod header;
 pub mod heatmap;
 pub mod leak;

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::bake::Rays;
 use super::baked::BakedFigures;
 use super::error::Figures;
 use super::header::Header;
 use super::leak::Leak;
 use super::render::ReferenceSummary;
+use crate::bake::figures::Rays;
 
 /// Version of the report's layout.
 pub const SCHEMA: &str = "lightprobe-sweep/1";

@@ -7,7 +7,7 @@ use crate::light::World;
 use crate::light::surface::SurfacePoint;
 use crate::math::random::{Purpose, Random};
 use crate::probe::query::QueryPoint;
-use crate::probe::surface_visibility::Facing;
+use crate::probe::store::surface::Facing;
 use crate::scene::{AlphaMode, Camera};
 use crate::trace::Ray;
 

@@ -22,8 +22,8 @@ use crate::light::path::{PathSettings, Strategy};
 use crate::light::sampled::RayCount;
 use crate::math::blocks::{BLOCK, Block};
 use crate::math::random::{Purpose, Random};
-use crate::progress::Progress;
 use crate::scene::Camera;
+use crate::system::progress::Progress;
 
 /// Number of all quantities.
 const MOST: usize = Quantity::Depth as usize + 1;

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 
 use super::points::View;
 use crate::image::{Picture, Picture8};
-use crate::probe::placement::ProbeState;
+use crate::probe::lattice::ProbeState;
 use crate::probe::{ProbeIndex, Volume};
 use crate::scene::Camera;
 use crate::scene::camera::Projection;

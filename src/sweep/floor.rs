@@ -8,7 +8,7 @@ use super::SweepError;
 use super::run::{Finished, Setting};
 use crate::bake::BakeError;
 use crate::config::{Config, ConfigError};
-use crate::probe::encode::ColorFormat;
+use crate::probe::store::encode::ColorFormat;
 use crate::report::sweep::{FloorCause, FloorReport, RunRecord};
 use crate::shade::methods::Method;
 

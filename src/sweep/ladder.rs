@@ -21,7 +21,7 @@ use serde::Deserialize;
 
 use super::SweepError;
 use crate::config::{Config, ConfigError, presets};
-use crate::input::read_file;
+use crate::system::input::read_file;
 
 /// Configurations of a sweep at most: more is a mistake in an axis.
 const MOST: usize = 4096;

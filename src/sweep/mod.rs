@@ -17,8 +17,8 @@ use std::path::PathBuf;
 use crate::bake::BakeError;
 use crate::config::ConfigError;
 use crate::image::ImageError;
-use crate::output::OutputError;
-use crate::probe::container::FileError;
+use crate::probe::file::container::FileError;
+use crate::system::output::OutputError;
 
 /// Why there is no sweep.
 #[derive(Debug, thiserror::Error)]

@@ -11,10 +11,10 @@ use crate::image::Picture;
 use crate::probe::Volume;
 use crate::probe::file::{self, ProbeFile, SceneRecord};
 use crate::probe::query::Query;
-use crate::progress::Progress;
 use crate::report::sweep::{BakeTimes, MethodFigures, RunRecord, TruthRecord};
 use crate::shade::methods::Method;
 use crate::shade::reference::ReferenceSettings;
+use crate::system::progress::Progress;
 
 /// What all runs share.
 pub struct Setting<'a, 's> {

@@ -14,8 +14,8 @@ use serde_json::Value;
 
 use super::SweepError;
 use crate::image::Picture;
-use crate::input::read_file;
-use crate::output::{create_folder, write_atomically};
+use crate::system::input::read_file;
+use crate::system::output::{create_folder, write_atomically};
 
 /// Version of what a run computes; raised whenever the same inputs give other results. The program's own version counts besides.
 const RESULTS: &str = concat!("lightprobe-sweep-run/1, ", env!("CARGO_PKG_VERSION"));

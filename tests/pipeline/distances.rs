@@ -1,11 +1,11 @@
 //! Distance maps: mean and deviation against integrals, and Chebyshev's bound made of them.
 
 use glam::{DVec3, UVec3, Vec2, Vec3};
-use lightprobe::probe::map::OctahedralMaps;
-use lightprobe::probe::placement::ProbeState;
+use lightprobe::probe::lattice::ProbeState;
 use lightprobe::probe::query::{Query, QueryPoint, QuerySettings, Visibility, VisibilitySettings};
-use lightprobe::probe::surface_visibility::Facing;
-use lightprobe::probe::volume::IrradianceCurve;
+use lightprobe::probe::store::map::OctahedralMaps;
+use lightprobe::probe::store::surface::Facing;
+use lightprobe::probe::store::volume::IrradianceCurve;
 use lightprobe::probe::{Grid, Volume};
 
 use crate::common::{Folder, Gltf};

@@ -15,10 +15,10 @@ use lightprobe::math::color::luminance;
 use lightprobe::math::octahedral::texel_direction;
 use lightprobe::math::random::Purpose;
 use lightprobe::probe::file::SceneRecord;
-use lightprobe::probe::truth::{RUNS, Truth};
-use lightprobe::progress::Progress;
+use lightprobe::probe::transport::truth::{RUNS, Truth};
 use lightprobe::report::baked;
 use lightprobe::scene::{self, LoadOptions};
+use lightprobe::system::progress::Progress;
 
 use crate::common::shared_scenes;
 

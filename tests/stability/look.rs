@@ -7,7 +7,7 @@ use glam::Vec3;
 use lightprobe::image::LayeredImage;
 use lightprobe::probe::file;
 use lightprobe::probe::query::{Query, QueryPoint, QuerySettings, Visibility};
-use lightprobe::probe::surface_visibility::Facing;
+use lightprobe::probe::store::surface::Facing;
 use lightprobe::scene::{self, LoadOptions, Scene};
 use serde_json::Value;
 

@@ -4,14 +4,13 @@ use std::path::Path;
 
 use anyhow::Result;
 
-use crate::cli::{RenderArgs, Size};
-use crate::commands::Console;
+use crate::cli::{PictureSize, RenderArgs};
+use crate::commands::{Console, check_picture_memory};
 use crate::light::World;
-use crate::memory::check_memory;
-use crate::output::{Named, check_apart, check_folder, check_outputs};
 use crate::scene::Camera;
 use crate::shade::outlook::Outlook;
 use crate::shade::points::has_blend;
+use crate::system::output::{Named, check_apart, check_folder, check_outputs};
 
 /// Memory that a render takes at its peak, per pixel and per point in the picture: the slope of peak memory over the
 /// number of pixels, which is 579 B where there is only sky and 758 B where each pixel shows one point, rounded up.
@@ -68,7 +67,7 @@ pub fn check_pictures(args: &RenderArgs, folder: &Path, inputs: &[Named]) -> Res
 
 /// Warns of cameras that show nothing of use, and refuses pictures that do not fit into memory.
 pub fn check_view(args: &RenderArgs, world: &World, camera: &Camera, console: &Console) -> Result<()> {
-    let Size { width, height } = args.view.size;
+    let PictureSize { width, height } = args.view.size;
     let outlook = Outlook::new(world, camera, width, height, args.trace.seed);
     if let Some(warning) = outlook.warning() {
         console.warn(format!("camera {}: {warning}", camera.name));
@@ -80,5 +79,5 @@ pub fn check_view(args: &RenderArgs, world: &World, camera: &Camera, console: &C
         Some(_) if has_blend(world) => LAYERED_REFERENCE_PIXEL_BYTES * points.max(1.0),
         Some(_) => REFERENCE_PIXEL_BYTES,
     };
-    Ok(check_memory(args.view.size, PIXEL_BYTES + of_points + of_reference)?)
+    Ok(check_picture_memory(args.view.size, PIXEL_BYTES + of_points + of_reference)?)
 }

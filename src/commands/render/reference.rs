@@ -12,7 +12,6 @@ use crate::cli::RenderArgs;
 use crate::commands::tell;
 use crate::image::LayeredImage;
 use crate::math::blocks::BLOCK;
-use crate::output::write_atomically;
 use crate::report::reference_layers::ReferenceLayers;
 use crate::report::render::ReferenceSummary;
 use crate::scene::Camera;
@@ -20,6 +19,7 @@ use crate::shade::points::View;
 use crate::shade::reference::{self, ReferenceSettings};
 use crate::shade::reference_file::Identity;
 use crate::shade::regions::{Region, regions};
+use crate::system::output::write_atomically;
 
 /// Where references come from.
 pub enum Source {

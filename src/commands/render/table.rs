@@ -3,9 +3,9 @@
 use crate::evaluate::PATH_RAY;
 use crate::report::baked::BakedReport;
 use crate::report::error::{ErrorReport, Measured};
-use crate::report::format;
 use crate::report::render::{MethodReport, RenderReport};
 use crate::report::table::{Column, Table};
+use crate::system::format;
 
 /// One camera's table, and in words where the errors lie.
 pub fn table(report: &RenderReport) -> String {

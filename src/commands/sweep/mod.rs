@@ -12,14 +12,12 @@ use anyhow::{Context, Result, bail};
 
 use self::summary::Measured;
 use super::camera::cameras;
-use super::{Console, check_apart_from, inputs, load_scene, set_sky, set_threads, tell};
+use super::{Console, check_apart_from, check_picture_memory, inputs, load_scene, set_sky, set_threads, tell};
 use crate::bake::{self, Circumstances};
 use crate::cli::{EqualName, SweepArgs};
 use crate::config::{Config, PlanMode, presets};
 use crate::evaluate::{Comparison, Scenery};
 use crate::light::World;
-use crate::memory::check_memory;
-use crate::output::{Named, check_folder, check_outputs, create_folder};
 use crate::report::sweep::{FloorReport, SweepTimes};
 use crate::scene::Scene;
 use crate::shade::points::see;
@@ -30,6 +28,7 @@ use crate::sweep::run::{Finished, Setting};
 use crate::sweep::split::Spread;
 use crate::sweep::store::Store;
 use crate::sweep::{SweepError, equal, floor};
+use crate::system::output::{Named, check_folder, check_outputs, create_folder};
 
 /// Memory that evaluation takes at its peak, per pixel: as a render's with a reference, and the sums over the seeds.
 const PIXEL_BYTES: f64 = 1500.0;
@@ -58,7 +57,7 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
     tell::scene(console, &args.scene, &scene, times.load);
     check_all(&ladders, &scene)?;
     let size = args.view.size;
-    check_memory(size, PIXEL_BYTES)?;
+    check_picture_memory(size, PIXEL_BYTES)?;
     let accel_started = Instant::now();
     let config = shared_config(&ladders)?;
     let world = World::new(&scene, config.lights.punctual_scale, config.solver.albedo_max)?;
@@ -184,7 +183,7 @@ fn check_all(ladders: &[Ladder], scene: &Scene) -> Result<(), SweepError> {
 
 /// Refuses what may not fit and, looked at closer, does not.
 fn check_captures(ladders: &[Ladder], world: &World, seed: u64) -> Result<(), SweepError> {
-    let progress = crate::progress::Progress::hidden();
+    let progress = crate::system::progress::Progress::hidden();
     let circumstances = Circumstances { seed, memory_budget_bytes: None, progress, checkpoint: None };
     for rung in ladders.iter().flat_map(|ladder| &ladder.rungs) {
         let named = |cause| SweepError::Bake { label: rung.label.clone(), cause };

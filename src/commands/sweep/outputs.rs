@@ -5,10 +5,10 @@ use std::path::Path;
 use anyhow::{Context, Result};
 
 use crate::commands::write_json;
-use crate::output::write_atomically;
-use crate::report::format;
 use crate::report::plot::{Axis, Chart, ChartSize, Guide, Mark, Scale, Series};
 use crate::report::sweep::{Aggregate, ConfigurationReport, Fronts, LadderReport, SweepReport};
+use crate::system::format;
+use crate::system::output::write_atomically;
 
 /// All that a sweep's folder gets besides its runs.
 pub const FILES: &[&str] = &[

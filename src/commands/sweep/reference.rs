@@ -5,11 +5,10 @@ use std::time::Instant;
 use anyhow::Result;
 
 use crate::cli::SweepArgs;
-use crate::commands::Console;
 use crate::commands::reference::{LAYERED_PIXEL_BYTES, PIXEL_BYTES, trace};
+use crate::commands::{Console, check_picture_memory};
 use crate::light::World;
 use crate::math::blocks::BLOCK;
-use crate::memory::check_memory;
 use crate::report::reference_layers::ReferenceLayers;
 use crate::report::render::ReferenceSummary;
 use crate::scene::Camera;
@@ -50,7 +49,7 @@ pub fn obtain(
     console: &Console,
 ) -> Result<SharedReference> {
     let (size, path) = (args.view.size, args.output.join(FILE));
-    check_memory(size, if has_blend(world) { LAYERED_PIXEL_BYTES } else { PIXEL_BYTES })?;
+    check_picture_memory(size, if has_blend(world) { LAYERED_PIXEL_BYTES } else { PIXEL_BYTES })?;
     let identity = Identity::new(world, camera, size.width, size.height, settings);
     let mut previous = None;
     if path.exists() {

@@ -1,8 +1,8 @@
 //! A sweep's report for people.
 
-use crate::report::format;
 use crate::report::sweep::{AxisValue, CheapestAt, ConfigurationReport, EqualReport, FloorReport, SweepReport};
 use crate::report::table::{Column, Table};
+use crate::system::format;
 
 /// All tables.
 pub fn text(report: &SweepReport) -> String {

@@ -17,11 +17,11 @@ use super::ratio::{Part, unevenness};
 use super::shown;
 use crate::image::{AnyImage, ImageHeader, Picture, Picture8};
 use crate::math::color::{byte_from_unit, luminance};
-use crate::memory::{TooLittleMemory, available_bytes};
 use crate::report::colormap::Scale;
 use crate::report::error::flip::flip_map;
 use crate::report::heatmap::{Heatmap, range_of};
 use crate::report::page::{MOST_PIXELS, PackedImage};
+use crate::system::memory::{TooLittleMemory, available_bytes};
 
 /// ε of `relmse`, as a share of the base's squared mean: as in the errors of `render`.
 const RELATIVE_FLOOR: f64 = 1.0e-2;

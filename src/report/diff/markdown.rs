@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::DiffReport;
 use super::gate::Gate;
 use super::words::{in_unit, margin, of_side, outcome};
-use crate::report::format;
+use crate::system::format;
 
 /// GitHub takes comments of 65,536 characters; this leaves room for what a job writes around it.
 const MAX_BYTES: usize = 60_000;

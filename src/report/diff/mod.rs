@@ -45,9 +45,9 @@ use self::shown::Shown;
 use self::sides::{Item, Side};
 use self::thresholds::Thresholds;
 use crate::image::{ImageError, Picture8};
-use crate::memory::TooLittleMemory;
-use crate::probe::container::FileError;
+use crate::probe::file::container::FileError;
 use crate::report::page::PageError;
+use crate::system::memory::TooLittleMemory;
 
 /// Version of the report's layout.
 pub const SCHEMA: &str = "lightprobe-diff/1";

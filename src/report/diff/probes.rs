@@ -15,7 +15,7 @@ use super::storage::structure;
 use crate::math::color::luminance;
 use crate::math::fibonacci;
 use crate::probe::file::{self, ProbeFile};
-use crate::probe::placement::ProbeState;
+use crate::probe::lattice::ProbeState;
 use crate::probe::{ProbeIndex, Volume};
 
 /// Directions that each probe is asked in: as many as the default has texels, but not their centres, so that what lies

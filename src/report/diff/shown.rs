@@ -7,7 +7,7 @@ use super::images::{ImageReport, LIGHT};
 use super::probes::{self, ProbesReport};
 use super::{DiffReport, SideReport};
 use crate::image::Picture;
-use crate::probe::placement::ProbeState;
+use crate::probe::lattice::ProbeState;
 use crate::report::page::{
     Figure, FigureTable, Histogram, PackedImage, Page, PageError, PageImage, Plot, ProbeComparison, ProbeRow, Side,
 };

@@ -8,8 +8,8 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::DiffError;
-use crate::input::read_file;
 use crate::report::{bake, render};
+use crate::system::input::read_file;
 
 /// The layout of sweeps.
 const SWEEP_SCHEMA: &str = "lightprobe-sweep/1";

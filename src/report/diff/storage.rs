@@ -1,9 +1,9 @@
 //! How two probe files store light, and what tells which of it arrives.
 
 use super::gate::{Direction, Finding};
-use crate::probe::encode::ColorFormat;
 use crate::probe::file::ProbeFile;
-use crate::probe::surface_visibility::SurfaceVisibility;
+use crate::probe::store::encode::ColorFormat;
+use crate::probe::store::surface::SurfaceVisibility;
 
 /// Less is worse.
 fn loss(name: &'static str, item: &str, values: [Option<f64>; 2], explanation: &str) -> Finding {

@@ -10,7 +10,7 @@ use super::images::join;
 use super::noise::Noise;
 use super::ratio::widening;
 use super::renders::{ERROR_RULES, METHOD_RULES};
-use crate::report::format;
+use crate::system::format;
 
 /// Of each configuration's `figures`, which are over its seeds: those that a render has too, and its gates.
 const OF_RENDERS: &[(&str, &str)] = &[

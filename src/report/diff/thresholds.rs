@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::gate::{Direction, Finding, Gate};
 use super::noise::Noise;
 use crate::config::messages;
-use crate::input::read_file;
+use crate::system::input::read_file;
 
 /// The defaults, and the only place where they and the names of the gates are.
 const DEFAULTS: &str = include_str!("../../../configs/diff.ron");

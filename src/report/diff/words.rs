@@ -1,7 +1,7 @@
 //! How gates are put into words, in tables, comments and commands alike.
 
 use super::gate::Gate;
-use crate::report::format;
+use crate::system::format;
 
 /// The unit of figures that are written as sizes.
 pub const BYTES: &str = "B";

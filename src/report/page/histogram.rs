@@ -10,8 +10,8 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use serde::Serialize;
 
 use crate::report::font;
-use crate::report::format;
 use crate::report::ticks::ticks;
+use crate::system::format;
 
 /// Bars over the whole range. Odd, so that one is centred on zero.
 const BARS: usize = 61;

@@ -8,8 +8,8 @@ use super::view::{DIGITS, FigureView, figures};
 use super::visible::visible;
 use super::{PageError, PageImage, budget, histogram, still};
 use crate::report::colormap::{Colormap, Scale};
-use crate::report::format;
 use crate::report::heatmap::range_of;
+use crate::system::format;
 
 #[derive(Debug, Serialize)]
 pub struct ImageView {

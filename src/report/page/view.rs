@@ -11,8 +11,8 @@ use super::{Figure, FigureTable, Page, PageError, ProbeComparison, Side, codes, 
 use crate::report::colormap::{Colormap, Scale};
 use crate::report::diff::gate::Gate;
 use crate::report::diff::words;
-use crate::report::format;
 use crate::report::heatmap::range_of;
+use crate::system::format;
 
 /// Colours of the heat map that the page looks up: one for each of 8 bits.
 const COLORS: usize = 256;

@@ -18,7 +18,7 @@ use plotters::style::{FontStyle, register_font};
 
 use super::font;
 use crate::image::{ImageError, Picture8};
-use crate::output::{OutputError, write_atomically};
+use crate::system::output::{OutputError, write_atomically};
 pub use axis::{Axis, Scale};
 
 /// The font's name in SVG files, with what stands in for it where it is not installed; its widths are like DejaVu's.

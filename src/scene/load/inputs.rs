@@ -9,7 +9,7 @@ use base64::alphabet;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use percent_encoding::percent_decode_str;
 
-use crate::input::read_file;
+use crate::system::input::read_file;
 
 /// Files read so far, and the hash over them in the order of reading.
 pub(super) struct Inputs {

@@ -1,8 +1,8 @@
 //! Surfaces that stop rays by chance.
 
 use lightprobe::light::path::Strategy;
-use lightprobe::progress::Progress;
 use lightprobe::shade::reference::{ReferenceSettings, trace};
+use lightprobe::system::progress::Progress;
 use serde_json::json;
 
 use super::{Check, HEIGHT, ROUNDING, WIDTH, camera, load, settings, small, world};

@@ -5,9 +5,9 @@ use std::f64::consts::PI;
 use glam::{DVec3, Vec3};
 use lightprobe::light::bsdf::Transport;
 use lightprobe::light::path::Strategy;
-use lightprobe::progress::Progress;
 use lightprobe::scene::Environment;
 use lightprobe::shade::reference::{ReferenceSettings, trace};
+use lightprobe::system::progress::Progress;
 use serde_json::{Value, json};
 
 use super::{Check, HEIGHT, ROUNDING, STRATEGIES, WIDTH, camera, load, settings, small, world};

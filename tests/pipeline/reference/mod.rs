@@ -20,10 +20,10 @@ use std::path::Path;
 use glam::{DVec3, Vec3};
 use lightprobe::light::World;
 use lightprobe::light::path::Strategy;
-use lightprobe::progress::Progress;
 use lightprobe::scene::{self, Camera, LoadOptions, Scene};
 use lightprobe::shade::points::{ImagePoint, see};
 use lightprobe::shade::reference::{Reference, ReferenceSettings, trace};
+use lightprobe::system::progress::Progress;
 
 const STRATEGIES: [Strategy; 3] = [Strategy::Mis, Strategy::BsdfOnly, Strategy::LightOnly];
 

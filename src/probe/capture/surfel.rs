@@ -2,9 +2,9 @@
 
 use glam::{Vec2, Vec3};
 
-use super::surface_visibility::Facing;
 use crate::light::surface::SurfacePoint;
 use crate::math::octahedral::oct_from_direction;
+use crate::probe::store::surface::Facing;
 
 /// A captured hit, in few bytes: a capture takes as long to be written to fresh memory as Embree takes for some of its
 /// rays, and every bounce reads it all.

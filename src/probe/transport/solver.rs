@@ -1,9 +1,9 @@
 //! Bounces: light goes from probes to the surfaces they captured and back, until nothing changes.
 //!
-//! The [`sweep`](super::sweep) is an affine map E ← E⁰ + T·E of the probes' irradiance. Repeating it (Jacobi's iteration)
+//! The [`sweep`](crate::probe::transport::operator) is an affine map E ← E⁰ + T·E of the probes' irradiance. Repeating it (Jacobi's iteration)
 //! adds a bounce a sweep, and what is missing shrinks by about the mean albedo: 44 sweeps to one percent at 0.9, 4,600 at
 //! 0.999. Where the measured ratio says that this would take many sweeps, they are combined instead, see
-//! [`anderson`](super::anderson): about ten then do, at the cost of a sweep each.
+//! [`anderson`](crate::probe::transport::anderson): about ten then do, at the cost of a sweep each.
 //!
 //! The residual of E is g(E) − E, in the max norm: for a filter and weights that are means, ‖T‖∞ bounds how far E is from
 //! the solution, ‖E − E*‖∞ ≤ ‖r‖∞/(1 − ‖T‖∞), whichever way E was found.
@@ -11,10 +11,10 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::anderson::History;
-use super::sweep::{Captures, Field, Masks, Sweep, field_of, store};
-use super::volume::Volume;
 use crate::math::color::luminance;
+use crate::probe::store::volume::Volume;
+use crate::probe::transport::anderson::History;
+use crate::probe::transport::operator::{Captures, Field, Masks, Sweep, field_of, store};
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use glam::{DVec3, Vec3, Vec3A};
 use safetensors::Dtype;
 
-use super::anderson::History;
-use super::container::{Container, FileError, Tensor};
-use super::solver::{Solution, State};
-use super::sweep::Field;
-use super::volume::Volume;
+use crate::probe::file::container::{Container, FileError, Tensor};
+use crate::probe::store::volume::Volume;
+use crate::probe::transport::anderson::History;
+use crate::probe::transport::operator::Field;
+use crate::probe::transport::solver::{Solution, State};
 
 /// Value of the metadata key `format`.
 const FORMAT: &str = "lightprobe-resume/2";

@@ -7,14 +7,14 @@
 use glam::Vec3A;
 use rayon::prelude::*;
 
-use super::Volume;
-use super::capture::{Capture, CaptureSettings, ReflectedLight};
-use super::filter::Kernel;
-use super::map::fill_with_border;
-use super::placement::ProbeState;
 use crate::light::World;
 use crate::math::octahedral::texel_direction;
-use crate::progress::Progress;
+use crate::probe::Volume;
+use crate::probe::capture::{Capture, CaptureSettings, ReflectedLight};
+use crate::probe::lattice::ProbeState;
+use crate::probe::store::kernel::Kernel;
+use crate::probe::store::map::fill_with_border;
+use crate::system::progress::Progress;
 
 /// Independent runs. Standard errors from eight are known to a quarter (1/√14).
 pub const RUNS: u64 = 8;

@@ -4,7 +4,7 @@ use glam::Vec3;
 use half::f16;
 use serde::{Deserialize, Serialize};
 
-use super::volume::IrradianceCurve;
+use crate::probe::store::volume::IrradianceCurve;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

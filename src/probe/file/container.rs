@@ -1,7 +1,7 @@
 //! Safetensors files with hashes: read with the crate, written here.
 //!
 //! The crate's own writer orders metadata by a random hash, makes files private and does not sync; this one sorts keys,
-//! so that the same content gives the same bytes, and goes through [`crate::output`].
+//! so that the same content gives the same bytes, and goes through [`crate::system::output`].
 //!
 //! Layout: header length (u64), header (JSON, padded with spaces to 8 bytes), tensors without gaps. The metadata key
 //! `blake3` maps every tensor to the hash of its bytes, and `__header__` to that of the header as compact JSON with
@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 use safetensors::{Dtype, SafeTensors};
 use serde_json::{Map, Value, json};
 
-use crate::input::read_file;
-use crate::output::{OutputError, write_atomically};
+use crate::system::input::read_file;
+use crate::system::output::{OutputError, write_atomically};
 
 const METADATA_KEY: &str = "__metadata__";
 const HASH_KEY: &str = "blake3";

@@ -1,34 +1,20 @@
 //! Which probes are worth baking: not those inside geometry, nor those that no surface can ever sample.
 
+pub mod need;
+pub mod overlap;
+pub mod survey;
+
 use glam::{UVec3, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::grid::Grid;
-use super::overlap::triangle_meets_box;
 use crate::light::World;
 use crate::math::fibonacci;
+use crate::probe::lattice::ProbeState;
+use crate::probe::lattice::grid::Grid;
+use crate::probe::place::overlap::triangle_meets_box;
 use crate::scene::{Mesh, TriangleIndex};
 use crate::trace::Ray;
-
-/// State of a probe, with the file's numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-#[repr(u8)]
-pub enum ProbeState {
-    Active = 0,
-    InsideGeometry = 1,
-    NeverSampled = 2,
-}
-
-impl ProbeState {
-    /// Inverse of `as u8`; `None` for numbers that no state has.
-    pub fn from_u8(value: u8) -> Option<ProbeState> {
-        [ProbeState::Active, ProbeState::InsideGeometry, ProbeState::NeverSampled]
-            .into_iter()
-            .find(|&state| state as u8 == value)
-    }
-}
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -72,7 +58,7 @@ pub fn place(world: &World, grid: &Grid, settings: &PlacementSettings, reach: f3
     let found: Vec<(ProbeState, Vec3, Surroundings)> = (0..grid.probe_count())
         .into_par_iter()
         .map(|probe| {
-            let position = grid.origin + grid.position_in_grid(super::ProbeIndex(probe as u32));
+            let position = grid.origin + grid.position_in_grid(crate::probe::ProbeIndex(probe as u32));
             if sampled[probe] || settings.keep_unsampled {
                 settler.settle(position)
             } else {

@@ -1,8 +1,8 @@
 //! What a method costs at run time: bytes of its GPU layout, from a formula that a test holds against tensor shapes.
 
-use super::encode::EncodingSettings;
-use super::filter::FilterSettings;
-use super::query::VisibilitySettings;
+use crate::probe::query::VisibilitySettings;
+use crate::probe::store::encode::EncodingSettings;
+use crate::probe::store::kernel::FilterSettings;
 
 /// Mean and deviation as two u16 per distance texel.
 const DISTANCE_TEXEL_BYTES: usize = 4;

@@ -2,6 +2,7 @@
 //!
 //! `bake` runs it once; whatever compares configurations runs it many times on one [`World`].
 
+pub mod figures;
 mod memory;
 mod predict;
 mod replay;
@@ -14,27 +15,28 @@ use rayon::prelude::*;
 
 use crate::config::{Config, PlanMode};
 use crate::light::World;
-use crate::memory::TooLittleMemory;
 use crate::plan::Plan;
 use crate::probe::capture::{Capture, EmissionTransport, ProbeCapture, ReflectedLight};
-use crate::probe::checkpoint;
-use crate::probe::container::{Container, FileError};
+use crate::probe::file::container::{Container, FileError};
 use crate::probe::file::{self, EncodingLosses, Origin, SceneRecord};
-use crate::probe::filter::Kernel;
-use crate::probe::grid::GridError;
-use crate::probe::map::{OctahedralMaps, fill_with_border};
-use crate::probe::need;
-use crate::probe::placement::{Placement, ProbeState, Settler, place};
+use crate::probe::lattice::ProbeState;
+use crate::probe::lattice::grid::GridError;
+use crate::probe::place::need;
+use crate::probe::place::survey::Measured;
+use crate::probe::place::{Placement, Settler, place};
 use crate::probe::query::VisibilitySettings;
-use crate::probe::solver::{self, Solution, State};
-use crate::probe::surface_visibility::SurfaceVisibility;
-use crate::probe::survey::Measured;
-use crate::probe::sweep::{Captures, Sweep};
+use crate::probe::store::kernel::Kernel;
+use crate::probe::store::map::{OctahedralMaps, fill_with_border};
+use crate::probe::store::surface::SurfaceVisibility;
+use crate::probe::transport::checkpoint;
+use crate::probe::transport::operator::{Captures, Sweep};
+use crate::probe::transport::solver::{self, Solution, State};
 use crate::probe::{Grid, Volume};
-use crate::progress::Progress;
-use crate::report::bake::{Numerics, Rays, Times};
 use crate::scene::Mesh;
+use crate::system::memory::TooLittleMemory;
+use crate::system::progress::Progress;
 
+use self::figures::{Numerics, Rays, Times};
 pub use self::memory::{Memory, check, surely_fits};
 pub use self::predict::Prediction;
 

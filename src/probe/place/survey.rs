@@ -3,11 +3,11 @@
 use glam::{UVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::grid::Grid;
-use super::overlap::triangle_meets_box;
-use super::placement::ProbeState;
-use super::surface_visibility::{Facing, SurfaceVisibility, active_corners, key, voxel_of_key};
 use crate::math::random::{Purpose, Random};
+use crate::probe::lattice::ProbeState;
+use crate::probe::lattice::grid::Grid;
+use crate::probe::place::overlap::triangle_meets_box;
+use crate::probe::store::surface::{Facing, SurfaceVisibility, active_corners, key, voxel_of_key};
 use crate::scene::{Mesh, Scene, TriangleIndex};
 use crate::trace::offset::ray_offset;
 use crate::trace::{Ray, Tracer};
@@ -57,7 +57,7 @@ pub struct Measured {
 
 /// Voxels are taken larger by this share on every side when surfaces are sorted into them, so that a surface on the
 /// border of two is known in both, on whichever side of it rounding puts the point that asks.
-pub(super) const VOXEL_MARGIN: f32 = 0.03;
+pub const VOXEL_MARGIN: f32 = 0.03;
 
 /// One side of a triangle in one voxel. Small, for there are millions and they are sorted.
 #[derive(Debug, Clone, Copy)]

@@ -9,16 +9,16 @@ use std::time::Instant;
 use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
 
-use super::capture::ProbeCapture;
-use super::filter::Kernel;
-use super::map::{fill_with_border, interior_texel};
-use super::placement::ProbeState;
-use super::query::{Query, QueryPoint, QuerySettings, Visibility};
-use super::surfel::Surfel;
-use super::volume::{IrradianceCurve, Volume};
 use crate::light::lambert::reflected_radiance;
 use crate::math::color::luminance;
 use crate::math::octahedral::{direction_from_oct, texel_direction};
+use crate::probe::capture::ProbeCapture;
+use crate::probe::capture::surfel::Surfel;
+use crate::probe::lattice::ProbeState;
+use crate::probe::query::{Query, QueryPoint, QuerySettings, Visibility};
+use crate::probe::store::kernel::Kernel;
+use crate::probe::store::map::{fill_with_border, interior_texel};
+use crate::probe::store::volume::{IrradianceCurve, Volume};
 
 /// Where the captures of all probes come from: memory, or traced again.
 pub trait Captures: Sync {

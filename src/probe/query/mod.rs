@@ -5,10 +5,10 @@
 use glam::{Vec2, Vec3, Vec3A};
 use serde::{Deserialize, Serialize};
 
-use super::grid::ProbeIndex;
-use super::surface_visibility::{Facing, Seen};
-use super::volume::Volume;
 use crate::math::octahedral::oct_from_direction;
+use crate::probe::lattice::grid::ProbeIndex;
+use crate::probe::store::surface::{Facing, Seen};
+use crate::probe::store::volume::Volume;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -48,7 +48,7 @@ pub enum VisibilitySettings {
     None,
     /// Chebyshev's bound from the stored distance moments (Donnelly & Lauritzen 2006), to a power, not below a floor.
     Moments { power: f32, floor: f32 },
-    /// Visibility measured at the surfaces themselves, see [`super::surface_visibility`].
+    /// Visibility measured at the surfaces themselves, see [`crate::probe::store::surface`].
     Surface { voxels_per_cell: u32 },
 }
 
@@ -112,7 +112,7 @@ pub enum Visibility {
     Exact(u8),
 }
 
-/// The eight probes of a point, in the order of [`super::Grid::corner`], with their weights, not normalised.
+/// The eight probes of a point, in the order of [`crate::probe::Grid::corner`], with their weights, not normalised.
 #[derive(Debug, Clone, Copy)]
 pub struct CornerWeights {
     pub probes: [ProbeIndex; 8],

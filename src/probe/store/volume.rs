@@ -3,10 +3,10 @@
 use glam::{Vec2, Vec3, Vec3A};
 use serde::{Deserialize, Serialize};
 
-use super::grid::{Grid, ProbeIndex};
-use super::map::OctahedralMaps;
-use super::placement::ProbeState;
-use super::surface_visibility::SurfaceVisibility;
+use crate::probe::lattice::ProbeState;
+use crate::probe::lattice::grid::{Grid, ProbeIndex};
+use crate::probe::store::map::OctahedralMaps;
+use crate::probe::store::surface::SurfaceVisibility;
 use std::f32::consts::PI;
 
 /// The domain in which irradiance is stored and bilinearly filtered.

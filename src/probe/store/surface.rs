@@ -13,8 +13,8 @@
 
 use glam::{UVec3, Vec3};
 
-use super::grid::{Grid, ProbeIndex};
-use super::placement::ProbeState;
+use crate::probe::lattice::ProbeState;
+use crate::probe::lattice::grid::{Grid, ProbeIndex};
 
 /// Most voxels per cell and axis: 22³·6 keys fit 16 bits.
 pub const MAX_VOXELS_PER_CELL: u32 = 22;
@@ -152,12 +152,12 @@ fn voxel_of(fraction: Vec3, n: u32) -> UVec3 {
     (fraction * n as f32).as_uvec3().min(UVec3::splat(n - 1))
 }
 
-pub(super) fn key(voxel: UVec3, facing: Facing, n: u32) -> u16 {
+pub fn key(voxel: UVec3, facing: Facing, n: u32) -> u16 {
     ((voxel.x + n * (voxel.y + n * voxel.z)) * 6) as u16 + u16::from(facing.0)
 }
 
 /// Voxel within its cell; with [`Facing`] the inverse of [`key`].
-pub(super) fn voxel_of_key(key: u16, n: u32) -> UVec3 {
+pub fn voxel_of_key(key: u16, n: u32) -> UVec3 {
     let v = u32::from(key) / 6;
     UVec3::new(v % n, v / n % n, v / (n * n))
 }
@@ -172,7 +172,7 @@ impl Facing {
         Facing(2 * axis as u8 + u8::from(normal[axis] < 0.0))
     }
 
-    pub(super) fn opposite(self) -> Facing {
+    pub fn opposite(self) -> Facing {
         Facing(self.0 ^ 1)
     }
 }
@@ -190,7 +190,7 @@ fn nearest_entry(keys: &[u16], wanted: u16, n: u32, reach: u32) -> Option<usize>
 }
 
 /// Bit i: whether corner i of the cell is an active probe.
-pub(super) fn active_corners(grid: &Grid, states: &[ProbeState], base: UVec3) -> u8 {
+pub fn active_corners(grid: &Grid, states: &[ProbeState], base: UVec3) -> u8 {
     (0..8).fold(0, |mask, i| {
         let probe = grid.corner(base, i).0 as usize;
         mask | u8::from(states[probe] == ProbeState::Active) << i

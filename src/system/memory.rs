@@ -3,8 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::cli::Size;
-use crate::report::format;
+use super::format;
 
 /// A run needs more memory than there is.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -24,17 +23,13 @@ pub fn available_bytes() -> Option<u64> {
     [machine(), control_groups(), address_space()].into_iter().flatten().min()
 }
 
-/// Refuses pictures of this size where they take more memory than there is.
-pub fn check_memory(Size { width, height }: Size, bytes_per_pixel: f64) -> Result<(), TooLittleMemory> {
-    let needed = (f64::from(width) * f64::from(height) * bytes_per_pixel) as u64;
+/// Refuses what takes more memory than there is; `refusal` says whose doing it is.
+///
+/// # Errors
+/// [`TooLittleMemory`], where the system says what is available and it is less than `needed`.
+pub fn check_available(needed: u64, refusal: impl FnOnce(u64) -> TooLittleMemory) -> Result<(), TooLittleMemory> {
     match available_bytes() {
-        Some(available) if needed > available => Err(TooLittleMemory {
-            key: format!("--size {width}x{height}"),
-            what: "the pictures",
-            needed,
-            available,
-            remedy: "choose a smaller size",
-        }),
+        Some(available) if needed > available => Err(refusal(available)),
         _ => Ok(()),
     }
 }

@@ -1,6 +1,6 @@
 //! Probes go where surfaces need them.
 //!
-//! The survey of the surfaces ([`super::survey`]) tells which probes no surface sees — they lie below a
+//! The survey of the surfaces ([`crate::probe::place::survey`]) tells which probes no surface sees — they lie below a
 //! floor, behind a wall, in a cupboard — and which surfaces see no probe. Each such probe is moved next to such a
 //! surface within its own cells; what still is not seen afterwards need not be baked. Surfaces that see none of their
 //! eight probes even then are given one from the cells around.
@@ -8,11 +8,12 @@
 use glam::{UVec3, Vec3};
 use rayon::prelude::*;
 
-use super::grid::{Grid, ProbeIndex};
-use super::placement::{Placement, ProbeState, Settler};
-use super::surface_visibility::{Entry, SurfaceVisibility};
-use super::survey::{Measured, VOXEL_MARGIN};
 use crate::light::World;
+use crate::probe::lattice::ProbeState;
+use crate::probe::lattice::grid::{Grid, ProbeIndex};
+use crate::probe::place::survey::{Measured, VOXEL_MARGIN};
+use crate::probe::place::{Placement, Settler};
+use crate::probe::store::surface::{Entry, SurfaceVisibility};
 use crate::scene::Mesh;
 use crate::trace::{Ray, Tracer};
 

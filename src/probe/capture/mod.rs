@@ -4,10 +4,11 @@
 //! [`Surfel`] — enough to compute its outgoing radiance again and again as bounces are added — and of every texel the
 //! emitted radiance and the distance. Traced once; a bounce costs queries only.
 
+pub mod surfel;
+
 use glam::{DVec3, UVec2, Vec2, Vec3, Vec3A};
 use serde::{Deserialize, Serialize};
 
-use super::surfel::Surfel;
 use crate::light::World;
 use crate::light::lambert::reflected_radiance;
 use crate::light::path::PathSettings;
@@ -17,6 +18,7 @@ use crate::math::blocks::{BLOCK, Block};
 use crate::math::octahedral::{direction_and_density, oct_from_direction, solid_angle_density};
 use crate::math::random::{Purpose, Random, Spread};
 use crate::math::statistics::Moments;
+use crate::probe::capture::surfel::Surfel;
 use crate::trace::Ray;
 
 /// How the light of emissive surfaces and the sky reaches the surfaces that probes see.

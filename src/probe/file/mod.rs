@@ -1,5 +1,7 @@
 //! The probe file: a volume as tensors, and back.
 
+pub mod container;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -8,13 +10,15 @@ use safetensors::Dtype;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::container::{Container, FileError, Tensor};
-use super::encode::{ColorFormat, EncodingSettings, decode_colors, encode_colors, u16_from_unit, unit_from_u16};
-use super::grid::{Grid, MAX_PROBES};
-use super::map::OctahedralMaps;
-use super::placement::ProbeState;
-use super::surface_visibility::{MAX_VOXELS_PER_CELL, SurfaceVisibility};
-use super::volume::{IrradianceCurve, Volume};
+use crate::probe::file::container::{Container, FileError, Tensor};
+use crate::probe::lattice::ProbeState;
+use crate::probe::lattice::grid::{Grid, MAX_PROBES};
+use crate::probe::store::encode::{
+    ColorFormat, EncodingSettings, decode_colors, encode_colors, u16_from_unit, unit_from_u16,
+};
+use crate::probe::store::map::OctahedralMaps;
+use crate::probe::store::surface::{MAX_VOXELS_PER_CELL, SurfaceVisibility};
+use crate::probe::store::volume::{IrradianceCurve, Volume};
 
 /// Value of the metadata key `format`.
 pub const FORMAT: &str = "lightprobe/1";

@@ -1,0 +1,7 @@
+//! Where probes are and which of them count: the grid, and each probe's state.
+
+pub mod grid;
+mod state;
+
+pub use self::grid::{Grid, ProbeIndex};
+pub use self::state::ProbeState;

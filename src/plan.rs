@@ -5,14 +5,12 @@
 
 use serde::Serialize;
 
-use crate::config::{Config, PlanMode};
+use crate::config::{Config, VISIBILITY};
 use crate::light::World;
 use crate::probe::Grid;
 use crate::probe::lattice::ProbeState;
 use crate::probe::place::Placement;
-use crate::probe::query::VisibilitySettings;
-use crate::probe::store::surface::SurfaceVisibility;
-use crate::probe::transport::solver::SolverSettings;
+use crate::probe::transport::Transport;
 use crate::scene::{AlphaMode, Environment, Scene};
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -35,13 +33,7 @@ pub struct Plan {
 
 impl Plan {
     /// Decides from the scene, the configuration and what placement and the survey of the surfaces found.
-    pub fn new(
-        world: &World,
-        config: &Config,
-        grid: &Grid,
-        placement: &Placement,
-        survey: Option<&SurfaceVisibility>,
-    ) -> Plan {
+    pub fn new(world: &World, config: &Config, grid: &Grid, placement: &Placement) -> Plan {
         let scene = world.scene;
         let mut lines = vec![
             punctual(scene),
@@ -52,35 +44,32 @@ impl Plan {
             glossy(scene),
             unsampled(config, placement),
         ];
-        // Of surfaces beyond the probes' hull the survey knows nothing.
+        // The survey knows nothing of surfaces beyond the probes' hull.
         let surveyed = grid.covers(&scene.mesh);
-        let blocked = survey.is_none_or(|s| !surveyed || !s.all_visible(grid, &placement.states));
-        let visibility = blocked && config.query.visibility != VisibilitySettings::None;
-        lines.push(visibility_line(config, grid, survey, visibility));
-        if config.plan == PlanMode::KeepEverything {
-            for line in lines.iter_mut().filter(|l| !l.kept) {
-                line.reason = format!("kept by configuration; {}", line.reason);
-                (line.kept, line.saved_bytes, line.saved_s) = (true, None, None);
-            }
+        let blocked = placement.survey.as_ref().is_none_or(|s| !surveyed || !s.all_visible(grid, &placement.states));
+        let wanted = config.plan.keep.iter().any(|stage| stage == VISIBILITY);
+        let visibility = (blocked || wanted) && !config.store.occlusion.is_none();
+        lines.push(visibility_line(config, placement, visibility, blocked));
+        for line in lines.iter_mut().filter(|l| !l.kept && config.plan.keeps(l.stage)) {
+            line.reason = format!("kept by configuration; {}", line.reason);
+            (line.kept, line.saved_bytes, line.saved_s) = (true, None, None);
         }
         Plan { lines, visibility }
     }
 
-    /// The plan's line about bounces, known only afterwards.
-    pub fn add_bounces(&mut self, done: u32, settings: &SolverSettings, converged: bool, bounces_s: f64) {
-        let saved = settings.max_bounces.map_or(0, |most| most.saturating_sub(done));
+    /// Adds the line about bounces, known only afterwards: `done` of them in `bounces_s` seconds.
+    pub fn add_bounces(&mut self, done: u32, transport: &Transport, converged: bool, bounces_s: f64) {
+        let limit = transport.iteration().max_bounces;
+        let saved = limit.map_or(0, |most| most.saturating_sub(done));
         let per_bounce = bounces_s / f64::from(done.max(1));
-        self.lines.push(Line {
-            stage: "bounces",
-            kept: !converged,
-            reason: match settings.max_bounces {
-                _ if converged => format!("{done} sweeps; what further bounces would add is below the tolerance"),
-                Some(most) if most == done => format!("all {most} bounces; the tolerance was not reached"),
-                _ => format!("all {done} sweeps; the tolerance was not reached"),
-            },
-            saved_bytes: None,
-            saved_s: (converged && saved > 0).then_some(per_bounce * f64::from(saved)),
-        });
+        let reason = match limit {
+            _ if transport.is_complete() => "every captured hit holds all light already".to_owned(),
+            _ if converged => format!("{done} iterations; what further bounces would add is below the tolerance"),
+            Some(most) if most == done => format!("all {most} bounces; the tolerance was not reached"),
+            _ => format!("all {done} iterations; the tolerance was not reached"),
+        };
+        let saved_s = (converged && saved > 0).then_some(per_bounce * f64::from(saved));
+        self.lines.push(Line { stage: "bounces", kept: !converged, reason, saved_bytes: None, saved_s });
     }
 }
 
@@ -143,27 +132,23 @@ fn glossy(scene: &Scene) -> Line {
 }
 
 fn unsampled(config: &Config, placement: &Placement) -> Line {
-    let count = |state| placement.states.iter().filter(|&&s| s == state).count();
-    let unsampled = count(ProbeState::NeverSampled);
-    let inside = count(ProbeState::InsideGeometry);
+    let unsampled = placement.count(ProbeState::NeverSampled);
+    let inside = placement.count(ProbeState::InsideGeometry);
     let reason = format!("{unsampled} probe(s) that no surface can sample, {inside} inside geometry");
     line("unused_probes", unsampled + inside == 0 || config.placement.keep_unsampled && inside == 0, reason)
 }
 
-fn visibility_line(config: &Config, grid: &Grid, survey: Option<&SurfaceVisibility>, needed: bool) -> Line {
-    let stage = "visibility";
-    if config.query.visibility == VisibilitySettings::None {
-        return line(stage, false, "the method has none");
-    }
-    if needed {
-        return line(stage, true, "some surfaces do not see all probes around them");
-    }
-    let bytes = match config.query.visibility {
-        VisibilitySettings::Moments { .. } => {
-            let side = config.filter.distance_resolution + 2 * config.encoding.border;
-            (grid.probe_count() * (side * side * 4 + 4)) as u64
+fn visibility_line(config: &Config, placement: &Placement, kept: bool, blocked: bool) -> Line {
+    let occlusion = &config.store.occlusion;
+    match () {
+        _ if occlusion.is_none() => line(VISIBILITY, false, "the method has none"),
+        _ if blocked => line(VISIBILITY, true, "some surfaces do not see all probes around them"),
+        _ if kept => line(VISIBILITY, true, "kept by configuration; every surface sees all probes around it"),
+        _ => {
+            let probes = placement.states.len();
+            let per_probe = occlusion.runtime_bytes(config.store.border, placement.survey.as_ref(), probes);
+            let saved_bytes = Some((per_probe * probes as f64).round() as u64);
+            Line { saved_bytes, ..line(VISIBILITY, false, "every surface sees all probes around it") }
         }
-        _ => survey.map_or(0, SurfaceVisibility::bytes),
-    };
-    Line { saved_bytes: Some(bytes), ..line(stage, false, "every surface sees all probes around it") }
+    }
 }

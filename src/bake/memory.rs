@@ -1,31 +1,21 @@
 //! How much memory a bake takes: the arrays that grow with probes, resolutions and surfaces, by formulas beside which the
 //! rest is small.
 
+use super::BakeError;
 use crate::config::Config;
 use crate::probe::Grid;
 use crate::probe::capture::ProbeCapture;
 use crate::probe::capture::surfel::Surfel;
 use crate::probe::place::survey;
-use crate::probe::query::VisibilitySettings;
-use crate::probe::store::kernel::{FilterSettings, Kernel};
+use crate::probe::store::kernel::Kernel;
 use crate::probe::transport::anderson::History;
 use crate::scene::{Mesh, Scene};
 use crate::system::memory::{TooLittleMemory, available_bytes};
-
-use super::{BakeError, SURVEY_VOXELS};
 
 /// What every probe takes besides its maps: position and state, twice, what placement found around it, and the heads of
 /// its capture, of its masks and of a sweep's result.
 const PROBE_BYTES: u64 = size_of::<Option<ProbeCapture>>() as u64 + 160;
 
-/// Four floats: what a texel of irradiance takes in memory.
-const IRRADIANCE_TEXEL_BYTES: u64 = 16;
-/// Three floats: the same on its way into the file.
-const PLAIN_TEXEL_BYTES: u64 = 12;
-/// Two floats, and on the way into the file two codes, twice.
-const DISTANCE_TEXEL_BYTES: u64 = 8 + 8;
-/// Moments of distance: three f64 for each captured texel, until they are filtered.
-const MOMENTS_BYTES: u64 = 24;
 /// A captured surface with the mask that the bounces keep of it.
 pub const SURFEL_BYTES: u64 = size_of::<Surfel>() as u64 + 1;
 /// A texel that emits, in a list that grows by doubling.
@@ -47,32 +37,20 @@ pub struct Memory {
 
 impl Memory {
     pub fn of(config: &Config, grid: &Grid, mesh: &Mesh) -> Memory {
-        let (filter, encoding, capture) = (&config.filter, &config.encoding, &config.capture);
+        let (store, texels) = (&config.store, config.capture.rays.texels());
         let probes = grid.probe_count() as u64;
-        let texels = |resolution: usize| ((resolution + 2 * encoding.border) as u64).pow(2);
-        let has_distance = matches!(config.query.visibility, VisibilitySettings::Moments { .. });
-        // While a sweep runs the maps stand beside its results; while they are encoded, beside a copy and the codes.
-        let encoded = PLAIN_TEXEL_BYTES + encoding.irradiance.bytes_per_texel() as u64;
-        let irradiance = IRRADIANCE_TEXEL_BYTES + IRRADIANCE_TEXEL_BYTES.max(encoded);
-        let distance = if has_distance { texels(filter.distance_resolution) * DISTANCE_TEXEL_BYTES } else { 0 };
-        let voxels = match config.query.visibility {
-            VisibilitySettings::None => None,
-            VisibilitySettings::Moments { .. } => Some(SURVEY_VOXELS),
-            VisibilitySettings::Surface { voxels_per_cell } => Some(voxels_per_cell),
-        };
-        let mut kernels = Kernel::bytes(capture.resolution, filter.irradiance_resolution, 1.0);
-        if has_distance {
-            kernels += Kernel::bytes(capture.resolution, filter.distance_resolution, filter.distance_exponent);
-        }
-        let moments = if has_distance { capture.resolution.pow(2) as u64 * MOMENTS_BYTES } else { 0 };
-        let interior = probes * filter.irradiance_resolution.pow(2) as u64;
-        let history = if config.solver.may_accelerate() { History::bytes(interior) } else { 0 };
+        let unknowns = store.irradiance.unknowns();
+        let (distance_kernel, distances) = store.occlusion.filter_bytes(texels);
+        let iteration = config.transport.iteration();
+        let history = if iteration.may_accelerate() { History::bytes(probes * unknowns as u64) } else { 0 };
+        let per_probe = store.irradiance.working_bytes(store.border) + store.occlusion.working_bytes(store.border);
+        let survey = store.occlusion.survey_voxels();
         Memory {
             probes: probes * PROBE_BYTES,
-            survey: voxels.map_or(0, |voxels| survey::estimated_bytes(mesh, grid, voxels)),
-            kernels,
-            maps: probes * (texels(filter.irradiance_resolution) * irradiance + distance) + history,
-            in_flight: (surfels_bytes(config) + moments) * rayon::current_num_threads() as u64,
+            survey: survey.map_or(0, |voxels| survey::estimated_bytes(mesh, grid, voxels)),
+            kernels: Kernel::bytes(texels, unknowns, 1.0) + distance_kernel,
+            maps: probes * per_probe + history,
+            in_flight: (surfels_bytes(config) + distances) * rayon::current_num_threads() as u64,
         }
     }
 
@@ -89,23 +67,20 @@ impl Memory {
             return Ok(());
         }
         let grid = if config.grid.divisions.is_some() { "grid.divisions" } else { "grid.spacing_m" };
-        let default = FilterSettings::default();
-        let maps = match &config.filter {
-            f if f.irradiance_resolution > default.irradiance_resolution => "filter.irradiance_resolution",
-            f if f.distance_resolution > default.distance_resolution => "filter.distance_resolution",
-            _ => grid,
-        };
-        let kernels = match config.filter.irradiance_resolution.max(config.filter.distance_resolution) {
-            r if r < config.capture.resolution => "capture.resolution",
-            _ => maps,
-        };
+        let (irradiance, large_irradiance) = config.store.irradiance.size_key();
+        let occlusion = config.store.occlusion.size_key();
+        let large_occlusion = occlusion.filter(|(_, large)| *large);
+        let maps = if large_irradiance { irradiance } else { large_occlusion.map_or(grid, |(key, _)| key) };
+        let capture = config.capture.rays.size_key();
+        // Filters grow with what they come from and what they lead to.
+        let kernels = if maps == grid { capture } else { maps };
         let parts = [
-            (self.probes, grid, "so many probes"),
+            (self.probes, grid, "that many probes"),
             (self.survey, grid, "the survey of the surfaces"),
             (self.kernels, kernels, "filtering captures of that size into maps of that size"),
             (self.maps, maps, "the probes' maps"),
-            (self.in_flight, "capture.resolution", "one capture for each thread"),
-            (captures, "capture.resolution", "keeping all captures"),
+            (self.in_flight, capture, "one capture for each thread"),
+            (captures, capture, "keeping all captures"),
         ];
         let largest = parts.into_iter().max_by_key(|part| part.0).unwrap_or(parts[0]);
         Err(TooLittleMemory {
@@ -114,7 +89,7 @@ impl Memory {
             needed,
             available,
             remedy: match largest.2 {
-                "keeping all captures" => "give a --memory-budget, or lower capture.resolution or the number of probes",
+                "keeping all captures" => "give a --memory-budget, or lower it or the number of probes",
                 _ if largest.1 == "grid.spacing_m" => "raise it",
                 _ => "lower it",
             },
@@ -122,7 +97,7 @@ impl Memory {
     }
 }
 
-/// Refuses, before anything is traced, what cannot be baked: a grid that is none, and what needs more memory than there is
+/// Refuses, before anything is traced, what cannot be baked: grids without probes, and what needs more memory than there is
 /// whatever the survey finds.
 ///
 /// # Errors
@@ -145,6 +120,5 @@ pub fn surely_fits(config: &Config, scene: &Scene) -> Result<bool, BakeError> {
 
 /// Most that one probe's captured surfaces can take.
 pub fn surfels_bytes(config: &Config) -> u64 {
-    let rays = config.capture.resolution.pow(2) as u64 * config.capture.samples_per_texel as u64;
-    rays * SURFEL_BYTES
+    config.capture.rays.count() as u64 * SURFEL_BYTES
 }

@@ -2,17 +2,16 @@
 
 use std::time::Instant;
 
-use glam::{Vec2, Vec3, Vec3A};
+use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
 
+use super::gather::{Budgeted, CHUNK_BYTES};
 use super::memory::{EMITTED_BYTES, SURFEL_BYTES, surfels_bytes};
-use super::{Budgeted, CHUNK_BYTES, Circumstances, Prepared};
+use super::{Circumstances, Prepared};
 use crate::math::fibonacci;
 use crate::probe::capture::ProbeCapture;
-use crate::probe::store::kernel::Kernel;
-use crate::probe::store::map::OctahedralMaps;
-use crate::probe::transport::operator::Sweep;
-use crate::probe::transport::solver::SolverSettings;
+use crate::probe::store::Occlusion;
+use crate::probe::transport::operator::Operator;
 use crate::system::memory::{TooLittleMemory, peak_memory_bytes, resident_bytes};
 use crate::trace::Ray;
 
@@ -60,13 +59,13 @@ impl Prepared<'_, '_> {
         // Large captures are alike, and few of them fit into memory.
         let fitting = (CHUNK_BYTES / surfels_bytes(config).max(1)) as usize;
         let (pilot, share) = self.pilot(fitting.clamp(1, PILOT));
-        let distance_kernel = self.distance_kernel();
+        let occlusion = self.occlusion_builder();
         let started = Instant::now();
         let trace = |&probe: &usize| {
             let mut captured = self.trace(&capture, probe);
             // Filtered at once, and not kept.
             let distances = std::mem::take(&mut captured.distances);
-            std::hint::black_box(distance_kernel.as_ref().map(|kernel| kernel.distance(&distances)));
+            std::hint::black_box(occlusion.filter(&distances));
             captured
         };
         let traced: Vec<ProbeCapture> = pilot.par_iter().map(trace).collect();
@@ -76,28 +75,20 @@ impl Prepared<'_, '_> {
         // Light that is lost at every bounce: what is not reflected, and what leaves the scene.
         let seen: usize = traced.iter().map(|c| c.texels).sum();
         let reflected: Vec3A = traced.iter().flat_map(|c| &c.surfels).map(|s| Vec3A::from(s.albedo())).sum();
-        let ratio = f64::from((reflected / seen.max(1) as f32).max_element()).min(f64::from(config.solver.albedo_max));
+        let ratio = f64::from((reflected / seen.max(1) as f32).max_element()).min(f64::from(config.materials.albedo_max));
 
-        let filter = &config.filter;
         let mut stored: Vec<Option<ProbeCapture>> = (0..self.grid.probe_count()).map(|_| None).collect();
         pilot.iter().zip(traced).for_each(|(&probe, capture)| stored[probe] = Some(capture));
         let trace = |probe: usize| self.trace(&capture, probe);
-        let kernel = Kernel::cosine(config.capture.resolution, filter.irradiance_resolution);
-        let sweep = Sweep {
+        let occlusion = if self.plan.visibility { occlusion.finish() } else { Occlusion::None };
+        let volume = self.volume(occlusion);
+        let kernel = volume.irradiance.kernel(&config.capture.rays.directions());
+        let operator = Operator {
             captures: &Budgeted { stored, trace: &trace },
             kernel: &kernel,
             query: &config.query,
             gathers_emission: false,
         };
-        let zero = OctahedralMaps::new(
-            self.grid.probe_count(),
-            filter.irradiance_resolution,
-            config.encoding.border,
-            Vec3A::ZERO,
-        );
-        let distance = distance_kernel.map(|_| {
-            OctahedralMaps::new(self.grid.probe_count(), filter.distance_resolution, config.encoding.border, Vec2::ZERO)
-        });
         let mut retraced_s = 0.0;
         let budget = circumstances.memory_budget_bytes.unwrap_or(u64::MAX);
         if bytes > 0.0 && bytes > budget as f64 {
@@ -106,8 +97,8 @@ impl Prepared<'_, '_> {
         Prediction {
             survey_s: self.survey_s,
             capture_s,
-            bounce_s: sweep.time(&self.volume(zero, distance), &pilot) * share + retraced_s,
-            bounces: expected_sweeps(ratio, &config.solver),
+            bounce_s: operator.time(&volume, &pilot) * share + retraced_s,
+            bounces: config.transport.iteration().expected_iterations(ratio),
             capture_bytes: (bytes as u64).min(budget),
             map_bytes: self.memory.standing(),
             resident_bytes,
@@ -148,46 +139,11 @@ impl Prepared<'_, '_> {
         sum / (SURFEL_BYTES as f64 * (pilot.len() * RAYS).max(1) as f64)
     }
 
-    /// At most so many active probes, spread evenly, and how many each of them stands for.
+    /// At most `most` active probes, spread evenly, and how many each of them stands for.
     fn pilot(&self, most: usize) -> (Vec<usize>, f64) {
         let active = self.active();
         let pilot: Vec<usize> = active.iter().copied().step_by(active.len().div_ceil(most).max(1)).collect();
         let share = active.len() as f64 / pilot.len().max(1) as f64;
         (pilot, share)
-    }
-}
-
-/// Sweeps that combining them takes at most, by and large: 4 to 8 in the scenes of the project, 12 for stiff ones.
-const ACCELERATED_SWEEPS: u32 = 12;
-
-/// Sweeps after which a geometric series in `ratio` leaves less than the tolerance of the light.
-fn expected_sweeps(ratio: f64, settings: &SolverSettings) -> u32 {
-    let most = settings.most().min(if settings.may_accelerate() { ACCELERATED_SWEEPS } else { u32::MAX });
-    let tolerance = f64::from(settings.tolerance);
-    if ratio <= 0.0 || tolerance <= 0.0 {
-        return if ratio <= 0.0 { most.min(1) } else { most };
-    }
-    let bounces = ((tolerance * (1.0 - ratio) / ratio).ln() / ratio.ln()).ceil();
-    // `as` saturates.
-    (bounces.max(1.0) as u32).min(most)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_number_of_bounces_follows_from_the_albedo() {
-        // 0.5¹⁴ < 10⁻⁴ < 0.5¹³.
-        let expected = |ratio, tolerance, most| {
-            let settings = SolverSettings { max_bounces: Some(most), tolerance, ..Default::default() };
-            expected_sweeps(ratio, &settings)
-        };
-        assert_eq!(expected(0.5, 1e-4, 64), 14);
-        assert_eq!(expected(0.999, 1e-4, 64), 64);
-        assert_eq!(expected(0.0, 1e-4, 64), 1);
-        assert_eq!(expected(0.5, 0.0, 64), 64);
-        assert_eq!(expected(0.5, 1e-4, 0), 0);
-        assert_eq!(expected_sweeps(0.999, &SolverSettings::default()), ACCELERATED_SWEEPS);
     }
 }

@@ -4,7 +4,8 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::{CHUNK, Circumstances, Prepared};
+use super::gather::CHUNK;
+use super::{Circumstances, Prepared};
 
 impl Prepared<'_, '_> {
     /// Rays per second of bare Embree over the rays of the capture, in its order.

@@ -7,6 +7,8 @@ const FORMS: &[(&str, &str)] = &[
     ("cosine", "cosine(floor: 0.05)"),
     ("wrap", "wrap(offset: 0.2)"),
     ("path_traced", "path_traced(paths: 16)"),
+    ("paths", "paths(paths: 16)"),
+    ("chebyshev", "chebyshev(power: 3, floor: 0.05)"),
     ("moments", "moments(power: 3, floor: 0.05)"),
     ("surface", "surface(voxels_per_cell: 8)"),
 ];

@@ -1,39 +1,42 @@
-//! The configuration of a bake: a method of the literature, or ours, as a value.
+//! The configuration of a bake: where probes stand in a scene, and a method — of the literature, or ours — as a value.
 //!
-//! RON, with every key optional and an unknown key an error. Precedence: built-in defaults, then `--preset` or
-//! `--config`, then `--set key=value` in the order given. [`Config::default`] is the preset `default`.
+//! RON, with every key optional and an unknown key an error. A file is a list of assignments: only the keys that stand in
+//! it count. Layers lie on each other in this order: built-in defaults, `--preset`, `--config`, `--set key=value`
+//! ([`Layers`]). [`Config::default`] is the preset `default`.
 
+mod aliases;
+mod assignments;
 mod check;
+mod layers;
 pub(crate) mod messages;
-mod overrides;
 pub mod presets;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use ron::extensions::Extensions;
 use serde::{Deserialize, Serialize};
 
+pub use self::layers::Layers;
 use crate::probe::capture::CaptureSettings;
+use crate::probe::file::{LightRecord, QUERY_VERSION, QueryRecord};
 use crate::probe::lattice::grid::GridSettings;
 use crate::probe::place::PlacementSettings;
 use crate::probe::query::QuerySettings;
-use crate::probe::store::encode::EncodingSettings;
-use crate::probe::store::kernel::FilterSettings;
-use crate::probe::transport::solver::SolverSettings;
-use crate::system::input::read_file;
+use crate::probe::store::StoreSettings;
+use crate::probe::transport::Transport;
 
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
     pub grid: GridSettings,
-    pub placement: PlacementSettings,
     pub lights: LightSettings,
+    pub materials: MaterialSettings,
+    pub placement: PlacementSettings,
     pub capture: CaptureSettings,
-    pub filter: FilterSettings,
+    pub transport: Transport,
+    pub store: StoreSettings,
     pub query: QuerySettings,
-    pub solver: SolverSettings,
-    pub encoding: EncodingSettings,
-    pub plan: PlanMode,
+    pub plan: PlanSettings,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -51,6 +54,27 @@ impl Default for LightSettings {
     }
 }
 
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MaterialSettings {
+    /// Albedos are clamped to this, 0 up to but not including 1: at 1 light would never end.
+    pub albedo_max: f32,
+}
+
+impl Default for MaterialSettings {
+    fn default() -> Self {
+        MaterialSettings { albedo_max: 0.999 }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PlanSettings {
+    pub mode: PlanMode,
+    /// Stages that are never left out, by the names of the plan's lines.
+    pub keep: Vec<String>,
+}
+
 /// Whether the bake may leave out what the scene does not need.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -61,6 +85,28 @@ pub enum PlanMode {
     KeepEverything,
 }
 
+/// Names of the stages that a plan can leave out.
+pub const STAGES: &[&str] = &[
+    "punctual_shadow_rays",
+    "emissive_surfaces",
+    "sky",
+    "alpha_test",
+    "textures",
+    "radiance_levels",
+    "unused_probes",
+    VISIBILITY,
+];
+
+/// The stage that stores and asks what probes know about occlusion.
+pub const VISIBILITY: &str = "visibility";
+
+impl PlanSettings {
+    /// Whether a stage is computed and stored even where the scene does not need it.
+    pub fn keeps(&self, stage: &str) -> bool {
+        self.mode == PlanMode::KeepEverything || self.keep.iter().any(|kept| kept == stage)
+    }
+}
+
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
     #[error("cannot read the configuration {path}: {cause}; give the path of a RON file")]
@@ -69,41 +115,51 @@ pub enum ConfigError {
     Invalid { place: String, what: String },
     #[error("there is no preset '{name}'; there are: {known}")]
     NoPreset { name: String, known: String },
-    #[error("--set {assignment}: {what}")]
-    Override { assignment: String, what: String },
     #[error("{place}: {key} is {value}: {rule}")]
     OutOfRange { place: String, key: &'static str, value: String, rule: &'static str },
 }
 
 impl Config {
-    /// Reads RON text; `place` names it in errors.
+    /// Reads RON text over the defaults; `place` names it in errors.
+    ///
+    /// # Errors
+    /// The text is not RON, or has keys or values that a configuration does not take.
     pub fn parse(text: &str, place: &str) -> Result<Config, ConfigError> {
-        let config: Config = from_ron(text, place)?;
-        config.check(place)?;
-        if config.grid.spacing_m.is_some() && config.grid.divisions.is_some() {
-            let what = "grid.spacing_m and grid.divisions are both given; remove one".to_owned();
-            return Err(ConfigError::Invalid { place: place.to_owned(), what });
-        }
-        Ok(config)
-    }
-
-    pub fn load(path: &Path) -> Result<Config, ConfigError> {
-        let unreadable = |cause| ConfigError::Unreadable { path: path.to_owned(), cause };
-        let bytes = read_file(path).map_err(unreadable)?;
-        let text = String::from_utf8(bytes).map_err(|e| unreadable(std::io::Error::other(e.utf8_error())))?;
-        Config::parse(&text, &path.display().to_string())
+        Layers::default().text(text, place)?.config()
     }
 
     /// Applies `key=value` assignments in order.
+    ///
+    /// # Errors
+    /// Keys or values that a configuration does not take.
     pub fn with_overrides(self, assignments: &[String]) -> Result<Config, ConfigError> {
-        overrides::apply(self, assignments)
+        Layers::over(self).set(assignments)?.config()
     }
 
     /// The whole configuration as RON that [`Config::parse`] reads back.
     pub fn to_ron(&self) -> String {
         let pretty = ron::ser::PrettyConfig::new().indentor("    ").new_line("\n");
         // Plain records of numbers and enums: nothing in them can fail to serialise.
-        ron::ser::to_string_pretty(self, pretty).unwrap_or_default()
+        ron_options().to_string_pretty(self, pretty).unwrap_or_default()
+    }
+
+    /// What a probe file says about asking its probes.
+    pub fn query_record(&self) -> QueryRecord {
+        QueryRecord {
+            version: QUERY_VERSION,
+            weights: self.query.clone(),
+            moved: self.placement.rule.moves(),
+            light: self.light(),
+        }
+    }
+
+    /// The light and the materials that all methods of a scene share.
+    pub fn light(&self) -> LightRecord {
+        LightRecord {
+            punctual_scale: self.lights.punctual_scale,
+            sky: self.lights.sky,
+            albedo_max: self.materials.albedo_max,
+        }
     }
 }
 
@@ -117,49 +173,12 @@ pub fn from_ron<T: serde::de::DeserializeOwned>(text: &str, place: &str) -> Resu
     })
 }
 
-/// RON in which optional values are written without `Some`.
+/// RON in which optional values are written without `Some`, and the settings of a choice without a second pair of
+/// parentheses.
 pub(crate) fn ron_options() -> ron::Options {
-    ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME)
+    let extensions = Extensions::IMPLICIT_SOME | Extensions::UNWRAP_VARIANT_NEWTYPES;
+    ron::Options::default().with_default_extension(extensions)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ron_round_trip() {
-        let config = Config::default();
-        assert_eq!(Config::parse(&config.to_ron(), "itself").unwrap(), config);
-    }
-
-    #[test]
-    fn unknown_keys_name_the_nearest_one_and_the_place() {
-        let error = Config::parse("(grid: (\n  spacing: 1.0))", "a.ron").unwrap_err().to_string();
-        assert!(error.contains("a.ron, line 2") && error.contains("'spacing_m'"), "{error}");
-    }
-
-    #[test]
-    fn out_of_range_values_name_key_and_range() {
-        let error = Config::parse("(capture: (resolution: 0))", "a.ron").unwrap_err().to_string();
-        assert!(error.contains("capture.resolution is 0") && error.contains("1 to 1024"), "{error}");
-        assert!(Config::parse("(solver: (albedo_max: 1.0))", "a.ron").is_err());
-    }
-
-    #[test]
-    fn files_that_say_nothing_and_marks_before_them() {
-        assert_eq!(Config::parse("\u{feff}()", "a.ron").unwrap(), Config::default());
-        for (text, words) in [("", "it is empty"), ("\u{feff}\n", "it is empty"), ("// all defaults", "() gives")] {
-            let error = Config::parse(text, "a.ron").unwrap_err().to_string();
-            assert!(error.contains(words), "{error}");
-        }
-        let error = Config::parse("(query: (\n visibility: surface,\n))", "a.ron").unwrap_err().to_string();
-        assert!(error.contains("surface(voxels_per_cell: 8)") && error.contains("line 2"), "{error}");
-        let error = Config::parse("(grid: (spacing_m: 1, divisions: (2, 2, 2)))", "a.ron").unwrap_err().to_string();
-        assert!(error.contains("a.ron") && error.contains("remove one"), "{error}");
-    }
-
-    #[test]
-    fn options_need_no_some() {
-        assert_eq!(Config::parse("(grid: (spacing_m: 0.5))", "a.ron").unwrap().grid.spacing_m, Some(0.5));
-    }
-}
+mod tests;

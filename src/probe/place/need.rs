@@ -5,26 +5,17 @@
 //! surface within its own cells; what still is not seen afterwards need not be baked. Surfaces that see none of their
 //! eight probes even then are given one from the cells around.
 
-use glam::{UVec3, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
+use super::survey::{Survey, SurveySettings};
+use super::{Placement, Settler};
 use crate::light::World;
 use crate::probe::lattice::ProbeState;
-use crate::probe::lattice::grid::{Grid, ProbeIndex};
-use crate::probe::place::survey::{Measured, VOXEL_MARGIN};
-use crate::probe::place::{Placement, Settler};
+use crate::probe::lattice::grid::{CellIndex, Grid, ProbeIndex};
 use crate::probe::store::surface::{Entry, SurfaceVisibility};
 use crate::scene::Mesh;
 use crate::trace::{Ray, Tracer};
-
-/// How far from a surface in need a probe is put, in spacings; half the free space where that is less.
-const DISTANCE: f32 = 0.2;
-
-/// Layers of probes around a cell that are searched for surfaces which see none of its eight.
-const FAR_RINGS: u32 = 3;
-
-/// Places tried for one probe, nearest first.
-const MAX_TRIES: usize = 12;
 
 /// A stretch of surface that sees no probe: a point off it, with nothing in between, and the direction that it faces.
 #[derive(Debug, Clone, Copy)]
@@ -43,13 +34,11 @@ pub fn seen_probes(
     counts: impl Fn(usize) -> bool,
 ) -> Vec<bool> {
     let rim = !grid.covers(mesh);
-    let mut seen: Vec<bool> = (0..grid.probe_count()).map(|p| rim && grid.is_at_rim(ProbeIndex(p as u32))).collect();
-    for cell in 0..grid.cell_count() {
-        let base = grid.cell_base(cell);
+    let mut seen: Vec<bool> = grid.probes().map(|p| rim && grid.is_at_rim(p)).collect();
+    for cell in grid.cells() {
         let union = table.entries(cell).filter(|e| counts(e.index)).fold(0, |union, entry| union | entry.mask);
-        for i in (0..8).filter(|i| union >> i & 1 == 1) {
-            let probe = grid.corner(base, i).0 as usize;
-            seen[probe] |= placement.states[probe] == ProbeState::Active;
+        for (i, probe) in grid.corners(cell).iter().map(|probe| probe.0 as usize).enumerate() {
+            seen[probe] |= union >> i & 1 == 1 && placement.states[probe] == ProbeState::Active;
         }
     }
     seen
@@ -57,34 +46,35 @@ pub fn seen_probes(
 
 /// Moves probes that nothing sees to surfaces that see none. Returns how many were moved; the survey is out of date
 /// then.
-pub fn relocate(settler: &Settler, grid: &Grid, placement: &mut Placement, survey: &Measured) -> usize {
-    let table = &survey.table;
+pub fn relocate(settler: &Settler, placement: &mut Placement, survey: &Survey) -> usize {
+    let (grid, table) = (settler.grid, &survey.table);
     // A probe under the floor may see the floor's back; no one else does.
     let seen = seen_probes(&settler.world.scene.mesh, grid, placement, table, |entry| survey.fronts[entry]);
     let idle = |probe: usize| !seen[probe] && placement.sampled[probe];
-    let needs_of_cell = |cell: usize| -> Vec<Need> {
-        if !(0..8).any(|i| idle(grid.corner(grid.cell_base(cell), i).0 as usize)) {
+    let needs_of_cell = |cell: u32| -> Vec<Need> {
+        let cell = CellIndex(cell);
+        if !grid.corners(cell).iter().any(|probe| idle(probe.0 as usize)) {
             return Vec::new();
         }
-        table
-            .entries(cell)
-            .filter(|entry| entry.mask == 0)
-            .map(|entry| need(settler.world, grid, table, cell, &entry))
-            .collect()
+        let margin = survey.settings.voxel_margin;
+        let unseen = table.entries(cell).filter(|entry| entry.mask == 0);
+        unseen.map(|entry| need(settler.world, grid, table, cell, &entry, margin)).collect()
     };
-    let needs: Vec<Vec<Need>> = (0..grid.cell_count()).into_par_iter().map(needs_of_cell).collect();
+    let needs: Vec<Vec<Need>> = (0..grid.cell_count() as u32).into_par_iter().map(needs_of_cell).collect();
     let moves: Vec<(usize, Vec3)> = (0..grid.probe_count())
         .into_par_iter()
         .filter(|&probe| idle(probe))
         .filter_map(|probe| {
-            let grid_point = grid.origin + grid.position_in_grid(ProbeIndex(probe as u32));
+            let index = ProbeIndex(probe as u32);
+            let grid_point = grid.grid_point(index);
             let mut nearby: Vec<Need> =
-                cells_around(grid, ProbeIndex(probe as u32)).flat_map(|cell| needs[cell].iter().copied()).collect();
+                grid.cells_of(index).flat_map(|cell| needs[cell.0 as usize].iter().copied()).collect();
             nearby
                 .sort_by(|a, b| a.point.distance_squared(grid_point).total_cmp(&b.point.distance_squared(grid_point)));
             // Spread over the whole list, so that one blocked corner does not use up all tries.
-            let step = nearby.len().div_ceil(MAX_TRIES).max(1);
-            nearby.iter().step_by(step).find_map(|need| place_beside(settler, need)).map(|position| (probe, position))
+            let step = nearby.len().div_ceil(settler.settings.need_tries.max(1) as usize).max(1);
+            let mut tried = nearby.iter().step_by(step).take(settler.settings.need_tries as usize);
+            tried.find_map(|need| place_beside(settler, need)).map(|position| (probe, position))
         })
         .collect();
     for &(probe, position) in &moves {
@@ -95,16 +85,24 @@ pub fn relocate(settler: &Settler, grid: &Grid, placement: &mut Placement, surve
     moves.len()
 }
 
-fn need(world: &World, grid: &Grid, table: &SurfaceVisibility, cell: usize, entry: &Entry) -> Need {
-    let voxel_size = grid.spacing / table.voxels_per_cell as f32;
-    let voxel = grid.cell_base(cell) * table.voxels_per_cell + entry.voxel;
-    let centre = grid.origin + (voxel.as_vec3() + 0.5) * voxel_size;
+/// Where the surface of an entry can be seen from; `margin` is that of the survey's voxels.
+fn need(
+    world: &World,
+    grid: &Grid,
+    table: &SurfaceVisibility,
+    cell: CellIndex,
+    entry: &Entry,
+    margin: f32,
+) -> Need {
+    let (low, sides) = grid.cell_box(cell);
+    let voxel_size = sides / table.voxels_per_cell as f32;
+    let centre = low + (entry.voxel.as_vec3() + 0.5) * voxel_size;
     let normal = entry.facing;
     let depth = (voxel_size * normal).length();
     // The surface lies somewhere in the voxel; the voxel's face on the open side is off it, but another surface may lie in
     // that very face or before it, as a ceiling close above a lamp does. From behind, the first hit is the surface.
-    let behind = centre - normal * depth * (0.5 + VOXEL_MARGIN);
-    let to_face = depth * (1.0 + VOXEL_MARGIN);
+    let behind = centre - normal * depth * (0.5 + margin);
+    let to_face = depth * (1.0 + margin);
     let open = match world.surface(Ray::new(behind, normal, 0)) {
         Some(surface) if surface.hit.t < to_face => {
             let off = surface.hit.t + surface.ray_offset;
@@ -118,40 +116,33 @@ fn need(world: &World, grid: &Grid, table: &SurfaceVisibility, cell: usize, entr
 }
 
 /// For every entry that sees none of its eight probes: the nearest active probe of the cells around that it sees.
-pub fn far_probes(world: &World, grid: &Grid, placement: &Placement, table: &SurfaceVisibility) -> Vec<(u32, u32)> {
-    let of_cell = |cell: usize| -> Vec<(u32, u32)> {
+pub fn far_probes(
+    world: &World,
+    grid: &Grid,
+    placement: &Placement,
+    table: &SurfaceVisibility,
+    settings: &SurveySettings,
+) -> Vec<(u32, u32)> {
+    let of_cell = |cell: u32| -> Vec<(u32, u32)> {
+        let cell = CellIndex(cell);
         let in_need: Vec<Entry> = table.entries(cell).filter(|entry| entry.mask == 0).collect();
         if in_need.is_empty() {
             return Vec::new();
         }
-        let base = grid.cell_base(cell);
+        let is_active = |probe: &ProbeIndex| placement.states[probe.0 as usize] == ProbeState::Active;
         let rings: Vec<Vec<ProbeIndex>> =
-            (1..=FAR_RINGS).map(|ring| active_in_ring(grid, placement, base, ring)).collect();
+            (1..=settings.far_rings).map(|ring| grid.ring(cell, ring).filter(is_active).collect()).collect();
         in_need
             .iter()
             .filter_map(|entry| {
-                let need = need(world, grid, table, cell, entry);
+                let need = need(world, grid, table, cell, entry, settings.voxel_margin);
                 let seen = rings.iter().find_map(|ring| nearest_visible(&world.tracer, placement, ring, &need))?;
                 Some((entry.index as u32, seen.0))
             })
             .collect()
     };
     // Cells come in order, and so do a cell's entries: the list is sorted.
-    (0..grid.cell_count()).into_par_iter().flat_map_iter(of_cell).collect()
-}
-
-/// Active probes of the `ring`-th layer around the eight corners of a cell.
-fn active_in_ring(grid: &Grid, placement: &Placement, base: UVec3, ring: u32) -> Vec<ProbeIndex> {
-    let last = grid.divisions - UVec3::ONE;
-    let low = base.saturating_sub(UVec3::splat(ring));
-    let high = (base + UVec3::splat(1 + ring)).min(last);
-    let inner = |c: UVec3| (c + ring).cmpgt(base).all() && c.cmplt(base + UVec3::splat(1 + ring)).all();
-    (low.z..=high.z)
-        .flat_map(|z| (low.y..=high.y).flat_map(move |y| (low.x..=high.x).map(move |x| UVec3::new(x, y, z))))
-        .filter(|&coordinate| !inner(coordinate))
-        .map(|coordinate| grid.index(coordinate))
-        .filter(|probe| placement.states[probe.0 as usize] == ProbeState::Active)
-        .collect()
+    (0..grid.cell_count() as u32).into_par_iter().flat_map_iter(of_cell).collect()
 }
 
 /// The nearest of some probes that a surface sees.
@@ -166,18 +157,8 @@ fn nearest_visible(tracer: &Tracer, placement: &Placement, probes: &[ProbeIndex]
 
 /// A place from which the surface can be seen; `None` where its surroundings are the inside of something.
 fn place_beside(settler: &Settler, need: &Need) -> Option<Vec3> {
-    let wanted = DISTANCE * settler.spacing_m;
+    let wanted = settler.metres(settler.settings.need_distance);
     let free = settler.world.tracer.closest(Ray::new(need.point, need.normal, 0)).map_or(f32::INFINITY, |hit| hit.t);
     let position = need.point + need.normal * wanted.min(0.5 * free);
     (!settler.is_inside(&settler.look(position))).then_some(position)
-}
-
-/// Cells that a probe is a corner of.
-fn cells_around(grid: &Grid, probe: ProbeIndex) -> impl Iterator<Item = usize> + '_ {
-    let last = grid.cells() - UVec3::ONE;
-    let high = grid.coordinate(probe).min(last);
-    let low = grid.coordinate(probe).saturating_sub(UVec3::ONE).min(last);
-    (low.z..=high.z).flat_map(move |z| {
-        (low.y..=high.y).flat_map(move |y| (low.x..=high.x).map(move |x| grid.cell_index(UVec3::new(x, y, z))))
-    })
 }

@@ -2,34 +2,76 @@
 
 use glam::{UVec3, Vec2, Vec3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
+use super::Placement;
+use super::overlap::triangle_meets_box;
+use crate::light::World;
 use crate::math::random::{Purpose, Random};
-use crate::probe::lattice::ProbeState;
-use crate::probe::lattice::grid::Grid;
-use crate::probe::place::overlap::triangle_meets_box;
+use crate::probe::lattice::grid::{CellIndex, Grid};
 use crate::probe::store::surface::{Facing, SurfaceVisibility, active_corners, key, voxel_of_key};
-use crate::scene::{Mesh, Scene, TriangleIndex};
+use crate::scene::{Mesh, TriangleIndex};
+use crate::trace::Ray;
 use crate::trace::offset::ray_offset;
-use crate::trace::{Ray, Tracer};
 
-/// Points tried on a surface within one voxel, at first and in all where these disagree.
-const FIRST_POINTS: u32 = 2;
-const ALL_POINTS: u32 = 8;
+/// How closely surfaces are looked at.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SurveySettings {
+    /// Points tried on a surface within one voxel at first.
+    pub first_points: u32,
+    /// Points tried in all where the first ones disagree.
+    pub all_points: u32,
+    /// Points tried on the outside of a surface until one sees any probe: where walls meet, most of a voxel's surface may
+    /// lie inside the other wall, and the strip that does not must still be found.
+    pub search_points: u32,
+    /// Most search points on all triangles of a voxel's side together, as far as each still gets `all_points`/2: finely
+    /// divided surfaces need no more points than a wall of two triangles does.
+    pub group_search_points: u32,
+    /// Voxels are taken larger by this share of their side on every side when surfaces are sorted into them, so that a
+    /// surface on the border of two is known in both, on whichever side of it rounding puts the point that asks.
+    pub voxel_margin: f32,
+    /// Layers of probes around a cell that are searched for a probe where a surface sees none of its eight.
+    pub far_rings: u32,
+}
 
-/// Points tried on the outside of a surface until one sees any probe: where walls meet, most of a voxel's surface may
-/// lie inside the other wall, and the strip that does not must still be found.
-const SEARCH_POINTS: u32 = 32;
+impl Default for SurveySettings {
+    fn default() -> Self {
+        SurveySettings {
+            first_points: 2,
+            all_points: 8,
+            search_points: 32,
+            group_search_points: 128,
+            voxel_margin: 0.03,
+            far_rings: 3,
+        }
+    }
+}
 
-/// Most search points on all triangles of a voxel's side together, as far as each still gets `ALL_POINTS`/2: finely
-/// divided surfaces need no more points than a wall of two triangles does.
-const GROUP_SEARCH_POINTS: u32 = 4 * SEARCH_POINTS;
+impl SurveySettings {
+    /// Calls `rule(key, value, holds, rule)` for every number in it.
+    pub fn check(&self, rule: &mut dyn FnMut(&'static str, String, bool, &'static str)) {
+        for (key, value) in [
+            ("placement.survey.first_points", self.first_points),
+            ("placement.survey.all_points", self.all_points),
+            ("placement.survey.search_points", self.search_points),
+            ("placement.survey.group_search_points", self.group_search_points),
+        ] {
+            // Votes are counted in 8 bits.
+            rule(key, value.to_string(), (1..=255).contains(&value), "use 1 to 255");
+        }
+        let margin = self.voxel_margin;
+        rule("placement.survey.voxel_margin", margin.to_string(), (0.0..=0.5).contains(&margin), "use 0 to 0.5");
+        rule("placement.survey.far_rings", self.far_rings.to_string(), self.far_rings <= 16, "use 0 to 16");
+    }
+}
 
 /// Memory that a survey takes at most: one [`Side`] for each side of a triangle in each voxel that it meets, twice while
 /// they are collected. A triangle meets as many voxels as its area covers, those along its edges, and one.
 pub fn estimated_bytes(mesh: &Mesh, grid: &Grid, voxels_per_cell: u32) -> u64 {
     /// A tilted plane passes through more voxels than its area has faces, √3 times as many at most.
     const TILT: f64 = 1.733;
-    let voxel_m = f64::from(grid.spacing.min_element()) / f64::from(voxels_per_cell);
+    let voxel_m = f64::from(grid.spacing_min()) / f64::from(voxels_per_cell);
     let (low, high) = grid.hull(0.0);
     let voxels = |t: u32| {
         let corners = mesh.corners(TriangleIndex(t));
@@ -48,21 +90,18 @@ pub fn estimated_bytes(mesh: &Mesh, grid: &Grid, voxels_per_cell: u32) -> u64 {
 
 /// A table with what is known beside it while baking.
 #[derive(Debug, Clone)]
-pub struct Measured {
+pub struct Survey {
     pub table: SurfaceVisibility,
     /// Per entry: whether the front of a surface, or a surface that has no back, faces there.
     pub fronts: Vec<bool>,
     pub rays: u64,
+    pub settings: SurveySettings,
 }
-
-/// Voxels are taken larger by this share on every side when surfaces are sorted into them, so that a surface on the
-/// border of two is known in both, on whichever side of it rounding puts the point that asks.
-pub const VOXEL_MARGIN: f32 = 0.03;
 
 /// One side of a triangle in one voxel. Small, for there are millions and they are sorted.
 #[derive(Debug, Clone, Copy)]
 struct Side {
-    cell: u32,
+    cell: CellIndex,
     key: u16,
     /// Whether this is the back of the triangle.
     is_back: bool,
@@ -73,7 +112,7 @@ struct Side {
 /// What the points of a [`Side`] see.
 #[derive(Debug, Clone, Copy, Default)]
 struct Tally {
-    /// Rays traced: at most `SEARCH_POINTS` × 8.
+    /// Rays traced: at most eight for each point.
     rays: u16,
     /// Points that see any probe at all. The others lie inside solids where walls meet, and have no vote.
     points: u8,
@@ -92,30 +131,28 @@ impl Tally {
     }
 }
 
-impl Measured {
-    /// Measures every surface within the grid's hull.
-    pub fn survey(
-        scene: &Scene,
-        tracer: &Tracer,
+impl Survey {
+    /// Looks at every surface within the grid's hull, `voxels_per_cell` voxels along each axis of a cell.
+    pub fn run(
+        world: &World,
         grid: &Grid,
-        states: &[ProbeState],
-        positions: &[Vec3],
+        placement: &Placement,
         voxels_per_cell: u32,
+        settings: &SurveySettings,
         seed: u64,
-    ) -> Measured {
-        let survey = Survey { scene, tracer, grid, states, positions, n: voxels_per_cell, seed };
-        let mut sides: Vec<Side> =
-            (0..scene.mesh.triangles.len() as u32).into_par_iter().flat_map_iter(|t| survey.triangle(t)).collect();
+    ) -> Survey {
+        let surveyor = Surveyor { world, grid, placement, n: voxels_per_cell, settings, seed };
+        let triangles = world.scene.mesh.triangles.len() as u32;
+        let mut sides: Vec<Side> = (0..triangles).into_par_iter().flat_map_iter(|t| surveyor.triangle(t)).collect();
         // Sums of counts do not depend on the order, so neither does the result.
         sides.par_sort_unstable_by_key(|e| (e.cell, e.key));
         let mut rays: u64 = sides.iter().map(|e| u64::from(e.tally.rays)).sum();
         let mut groups: Vec<&mut [Side]> = sides.chunk_by_mut(|a, b| (a.cell, a.key) == (b.cell, b.key)).collect();
-        rays += groups.par_iter_mut().map(|group| survey.search(group)).sum::<u64>();
+        rays += groups.par_iter_mut().map(|group| surveyor.search(group)).sum::<u64>();
         let mut table = SurfaceVisibility { voxels_per_cell, ..Default::default() };
         let mut fronts = Vec::new();
-        let cells = grid.cell_count();
         let mut groups = groups.into_iter().peekable();
-        for cell in 0..cells as u32 {
+        for cell in grid.cells() {
             table.cell_start.push(table.keys.len() as u32);
             while let Some(group) = groups.next_if(|g| g[0].cell == cell) {
                 let mask = majority(group);
@@ -129,7 +166,7 @@ impl Measured {
             }
         }
         table.cell_start.push(table.keys.len() as u32);
-        Measured { table, fronts, rays }
+        Survey { table, fronts, rays, settings: settings.clone() }
     }
 }
 
@@ -144,76 +181,66 @@ fn majority(group: &[Side]) -> u8 {
     })
 }
 
-struct Survey<'a> {
-    scene: &'a Scene,
-    tracer: &'a Tracer<'a>,
+struct Surveyor<'a, 's> {
+    world: &'a World<'s>,
     grid: &'a Grid,
-    states: &'a [ProbeState],
-    positions: &'a [Vec3],
+    placement: &'a Placement,
     n: u32,
+    settings: &'a SurveySettings,
     seed: u64,
 }
 
-impl Survey<'_> {
+impl Surveyor<'_, '_> {
     fn mesh(&self) -> &Mesh {
-        &self.scene.mesh
+        &self.world.scene.mesh
     }
 
     /// Tallies of both sides of a triangle, in every voxel that it meets.
     fn triangle(&self, triangle: u32) -> Vec<Side> {
         let mut out = Vec::new();
         let corners = self.mesh().corners(TriangleIndex(triangle));
-        let in_grid = corners.map(|p| self.grid.grid_from_scene(p));
-        let cells = self.grid.cells();
-        let margin = VOXEL_MARGIN / self.n as f32;
-        let low = in_grid[0].min(in_grid[1]).min(in_grid[2]) - margin;
-        let high = in_grid[0].max(in_grid[1]).max(in_grid[2]) + margin;
-        if high.cmplt(Vec3::ZERO).any() || low.cmpgt(cells.as_vec3()).any() {
+        let (low, high) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
+        // In cells.
+        let margin = self.settings.voxel_margin / self.n as f32;
+        let (beyond, _) = self.grid.is_beyond(low, high, margin);
+        if beyond {
             return out;
         }
-        let last = cells - UVec3::ONE;
-        let first = low.floor().max(Vec3::ZERO).as_uvec3().min(last);
-        let past = high.floor().max(Vec3::ZERO).as_uvec3().min(last);
-        for z in first.z..=past.z {
-            for y in first.y..=past.y {
-                for x in first.x..=past.x {
-                    let base = UVec3::new(x, y, z);
-                    let local = in_grid.map(|c| c - base.as_vec3());
-                    if triangle_meets_box(local.map(|c| c - 0.5), Vec3::splat(0.5 + VOXEL_MARGIN / self.n as f32)) {
-                        self.cell(triangle, &local, base, &mut out);
-                    }
-                }
+        for cell in self.grid.cells_near(low, high, margin) {
+            let local = corners.map(|c| self.grid.cell_from_scene(cell, c));
+            if triangle_meets_box(local.map(|c| c - 0.5), Vec3::splat(0.5 + margin)) {
+                self.cell(triangle, &local, cell, &mut out);
             }
         }
         out
     }
 
     /// One triangle in one cell; `local` are its corners in units of the cell.
-    fn cell(&self, triangle: u32, local: &[Vec3; 3], base: UVec3, out: &mut Vec<Side>) {
-        if active_corners(self.grid, self.states, base) == 0 {
+    fn cell(&self, triangle: u32, local: &[Vec3; 3], cell: CellIndex, out: &mut Vec<Side>) {
+        if active_corners(self.grid, &self.placement.states, cell) == 0 {
             return;
         }
         let n = self.n as f32;
+        let margin = self.settings.voxel_margin;
         let scaled = local.map(|c| c * n);
-        let low = scaled[0].min(scaled[1]).min(scaled[2]) - VOXEL_MARGIN;
-        let high = scaled[0].max(scaled[1]).max(scaled[2]) + VOXEL_MARGIN;
+        let low = scaled[0].min(scaled[1]).min(scaled[2]) - margin;
+        let high = scaled[0].max(scaled[1]).max(scaled[2]) + margin;
         let last = UVec3::splat(self.n - 1);
         let (low, high) = (low.max(Vec3::ZERO).as_uvec3().min(last), high.max(Vec3::ZERO).as_uvec3().min(last));
         let front = Facing::of(self.mesh().geometric_normal(TriangleIndex(triangle)));
-        let cell = self.grid.cell_index(base) as u32;
         for z in low.z..=high.z {
             for y in low.y..=high.y {
                 for x in low.x..=high.x {
                     let voxel = UVec3::new(x, y, z);
                     let centre = voxel.as_vec3() + 0.5;
                     let around = scaled.map(|c| c - centre);
-                    if !triangle_meets_box(around, Vec3::splat(0.5 + VOXEL_MARGIN)) {
+                    if !triangle_meets_box(around, Vec3::splat(0.5 + margin)) {
                         continue;
                     }
                     for (is_back, facing) in [(false, front), (true, front.opposite())] {
                         let key = key(voxel, facing, self.n);
                         let mut side = Side { cell, key, is_back, triangle, tally: Tally::default() };
-                        side.tally = self.tally(&side, base, &around, FIRST_POINTS);
+                        side.tally = self.tally(&side, &around, self.settings.first_points);
                         out.push(side);
                     }
                 }
@@ -228,15 +255,17 @@ impl Survey<'_> {
             return 0;
         }
         let mut rays = 0;
-        let base = self.grid.cell_base(group[0].cell as usize);
-        let centre = base.as_vec3() + (voxel_of_key(group[0].key, self.n).as_vec3() + 0.5) / self.n as f32;
+        let cell = group[0].cell;
+        // In units of the cell.
+        let centre = (voxel_of_key(group[0].key, self.n).as_vec3() + 0.5) / self.n as f32;
         let unseen = |e: &Side| e.tally.outside && !e.tally.edge_only && e.tally.rays > 0;
         let count = group.iter().filter(|e| unseen(e)).count().max(1) as u32;
-        let points = (GROUP_SEARCH_POINTS / count).clamp(ALL_POINTS / 2, SEARCH_POINTS);
+        let SurveySettings { all_points, search_points, group_search_points, .. } = *self.settings;
+        let points = (group_search_points / count).max(all_points / 2).min(search_points);
         for side in group.iter_mut().filter(|e| unseen(e)) {
             let corners = self.mesh().corners(TriangleIndex(side.triangle));
-            let around = corners.map(|p| (self.grid.grid_from_scene(p) - centre) * self.n as f32);
-            side.tally = self.tally(side, base, &around, points);
+            let around = corners.map(|p| (self.grid.cell_from_scene(cell, p) - centre) * self.n as f32);
+            side.tally = self.tally(side, &around, points);
             rays += u64::from(side.tally.rays);
         }
         rays
@@ -244,32 +273,34 @@ impl Survey<'_> {
 
     /// Rays from points of a triangle within a voxel; `around` are its corners relative to the voxel's centre. Up to
     /// `search` points are tried until one sees any probe.
-    fn tally(&self, side: &Side, base: UVec3, around: &[Vec3; 3], search: u32) -> Tally {
+    fn tally(&self, side: &Side, around: &[Vec3; 3], search: u32) -> Tally {
         let triangle = TriangleIndex(side.triangle);
         let corners = &self.mesh().corners(triangle);
         let front = self.mesh().geometric_normal(triangle);
         let normal = if side.is_back { -front } else { front };
-        let active = active_corners(self.grid, self.states, base);
-        let stream = u64::from(side.cell) << 16 | u64::from(side.key);
+        let active = active_corners(self.grid, &self.placement.states, side.cell);
+        let probes = self.grid.corners(side.cell);
+        let stream = u64::from(side.cell.0) << 16 | u64::from(side.key);
         let mut random = Random::new(
             self.seed,
             Purpose::SurfaceVisibility,
             stream,
             2 * u64::from(side.triangle) + u64::from(side.is_back),
         );
-        let outside = !side.is_back || self.scene.material(triangle).double_sided;
+        let outside = !side.is_back || self.world.scene.material(triangle).double_sided;
+        let SurveySettings { first_points, all_points, voxel_margin, .. } = *self.settings;
         let mut tally = Tally { outside, ..Tally::default() };
         for tried in 0.. {
             let enough = match tally.points {
                 _ if tally.edge_only => 1,
                 0 => search,
-                points if tally.visible.iter().all(|&v| v == 0 || v == points) => FIRST_POINTS,
-                _ => ALL_POINTS,
+                points if tally.visible.iter().all(|&v| v == 0 || v == points) => first_points,
+                _ => all_points,
             };
             if tried >= enough {
                 break;
             }
-            let (barycentric, inside) = point_in_voxel(around, &mut random);
+            let (barycentric, inside) = point_in_voxel(around, voxel_margin, &mut random);
             tally.edge_only |= !inside;
             let position =
                 corners[0] + (corners[1] - corners[0]) * barycentric.x + (corners[2] - corners[0]) * barycentric.y;
@@ -279,7 +310,7 @@ impl Survey<'_> {
                 if active >> corner & 1 == 0 {
                     continue;
                 }
-                let probe = self.positions[self.grid.corner(base, corner).0 as usize];
+                let probe = self.placement.positions[probes[corner].0 as usize];
                 // A probe behind the surface is hidden by the surface itself.
                 if (probe - origin).dot(normal) <= 0.0 {
                     continue;
@@ -287,7 +318,7 @@ impl Survey<'_> {
                 tally.rays += 1;
                 // From the surface: most rays that are blocked are blocked near it, where walls and solids meet, and
                 // Embree looks there first.
-                seen |= u8::from(!self.tracer.occluded(Ray::segment(origin, probe, random.bits()))) << corner;
+                seen |= u8::from(!self.world.tracer.occluded(Ray::segment(origin, probe, random.bits()))) << corner;
             }
             tally.points += u8::from(seen != 0);
             (0..8).for_each(|corner| tally.visible[corner] += seen >> corner & 1);
@@ -298,7 +329,7 @@ impl Survey<'_> {
 
 /// Barycentric coordinates of a random point of a triangle inside the unit box around the origin, and whether there
 /// is one; where chance finds none (slivers, corners), of the triangle's point nearest the box's centre.
-fn point_in_voxel(around: &[Vec3; 3], random: &mut Random) -> (Vec2, bool) {
+fn point_in_voxel(around: &[Vec3; 3], margin: f32, random: &mut Random) -> (Vec2, bool) {
     /// Tries before a triangle's share of a voxel counts as a sliver.
     const TRIES: usize = 8;
     let (e1, e2) = (around[1] - around[0], around[2] - around[0]);
@@ -310,7 +341,7 @@ fn point_in_voxel(around: &[Vec3; 3], random: &mut Random) -> (Vec2, bool) {
         let p = Vec2::new(random.uniform() - 0.5 - around[0][u], random.uniform() - 0.5 - around[0][v]);
         let b = Vec2::new(p.x * e2[v] - p.y * e2[u], e1[u] * p.y - e1[v] * p.x) / determinant;
         let along_axis = around[0][axis] + e1[axis] * b.x + e2[axis] * b.y;
-        if b.x >= 0.0 && b.y >= 0.0 && b.x + b.y <= 1.0 && along_axis.abs() <= 0.5 + VOXEL_MARGIN {
+        if b.x >= 0.0 && b.y >= 0.0 && b.x + b.y <= 1.0 && along_axis.abs() <= 0.5 + margin {
             return (b, true);
         }
     }

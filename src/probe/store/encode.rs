@@ -2,25 +2,11 @@
 
 use glam::Vec3;
 use half::f16;
+use safetensors::Dtype;
 use serde::{Deserialize, Serialize};
 
-use crate::probe::store::volume::IrradianceCurve;
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct EncodingSettings {
-    pub irradiance: ColorFormat,
-    pub curve: IrradianceCurve,
-    /// Texels around each map that repeat the far side, for seamless bilinear look-up: 0 or 1.
-    pub border: usize,
-}
-
-impl Default for EncodingSettings {
-    fn default() -> Self {
-        EncodingSettings { irradiance: ColorFormat::R11G11B10F, curve: IrradianceCurve::Linear, border: 1 }
-    }
-}
-
+/// Format of a colour's numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ColorFormat {
@@ -36,6 +22,43 @@ impl ColorFormat {
             ColorFormat::F32 => 12,
             ColorFormat::F16 => 6,
             ColorFormat::R11G11B10F => 4,
+        }
+    }
+
+    /// Type of the tensor's numbers: one a texel where packed, else three.
+    pub fn dtype(self) -> Dtype {
+        match self {
+            ColorFormat::F32 => Dtype::F32,
+            ColorFormat::F16 => Dtype::F16,
+            ColorFormat::R11G11B10F => Dtype::U32,
+        }
+    }
+
+    /// Inverse of [`Self::dtype`].
+    pub fn of(dtype: Dtype) -> Option<ColorFormat> {
+        [ColorFormat::F32, ColorFormat::F16, ColorFormat::R11G11B10F].into_iter().find(|f| f.dtype() == dtype)
+    }
+
+    /// Whether a texel is one number.
+    pub fn is_packed(self) -> bool {
+        self == ColorFormat::R11G11B10F
+    }
+
+    /// Largest relative error of a stored value within the format's range: half a step of the mantissa.
+    pub fn rounding(self) -> f64 {
+        match self {
+            ColorFormat::F32 => 2.0_f64.powi(-24),
+            ColorFormat::F16 => 2.0_f64.powi(-11),
+            ColorFormat::R11G11B10F => 2.0_f64.powi(-6),
+        }
+    }
+
+    /// Name in configurations.
+    pub fn name(self) -> &'static str {
+        match self {
+            ColorFormat::F32 => "f32",
+            ColorFormat::F16 => "f16",
+            ColorFormat::R11G11B10F => "r11g11b10f",
         }
     }
 

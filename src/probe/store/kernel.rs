@@ -7,9 +7,8 @@
 use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3, Vec3A};
-use serde::{Deserialize, Serialize};
 
-use crate::math::octahedral::{direction_from_oct, solid_angle_density, texel_direction};
+use crate::math::octahedral::{direction_from_oct, solid_angle_density};
 use crate::math::statistics::Moments;
 
 /// Points per side at which the weight of one capture texel is integrated.
@@ -18,27 +17,32 @@ const QUADRATURE: usize = 4;
 /// Weights below this share of a row's largest are left out: together they are below f32's own rounding.
 const NEGLIGIBLE: f32 = 1e-9;
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct FilterSettings {
-    /// Interior texels per side of the irradiance map.
-    pub irradiance_resolution: usize,
-    /// Interior texels per side of the distance map.
-    pub distance_resolution: usize,
-    /// Exponent k of the lobe max(0, ω·d)^k that distances are averaged under.
-    pub distance_exponent: f32,
-    /// Distances beyond this many cell diagonals count as this; so do misses.
-    pub distance_clamp: f32,
+/// Directions within every captured texel, each with the solid angle that it stands for, sr: what filters integrate over.
+#[derive(Debug, Clone)]
+pub struct Directions {
+    /// As many a texel as there are in [`Self::per_texel`].
+    all: Vec<(Vec3, f32)>,
+    per_texel: usize,
 }
 
-impl Default for FilterSettings {
-    fn default() -> Self {
-        FilterSettings {
-            irradiance_resolution: 8,
-            distance_resolution: 14,
-            distance_exponent: 50.0,
-            distance_clamp: 1.5,
-        }
+impl Directions {
+    /// Of an octahedral map of `resolution`² texels, [`QUADRATURE`]² a texel.
+    pub fn octahedral(resolution: usize) -> Directions {
+        let fine = (resolution * QUADRATURE) as f32;
+        let of_texel = |t: usize| {
+            let corner = Vec2::new((t % resolution) as f32, (t / resolution) as f32) * QUADRATURE as f32;
+            (0..QUADRATURE * QUADRATURE).map(move |i| {
+                let inside = Vec2::new((i % QUADRATURE) as f32 + 0.5, (i / QUADRATURE) as f32 + 0.5);
+                let oct = (corner + inside) / fine * 2.0 - 1.0;
+                (direction_from_oct(oct), solid_angle_density(oct))
+            })
+        };
+        let all = (0..resolution * resolution).flat_map(of_texel).collect();
+        Directions { all, per_texel: QUADRATURE * QUADRATURE }
+    }
+
+    pub fn texels(&self) -> usize {
+        self.all.len() / self.per_texel
     }
 }
 
@@ -51,39 +55,37 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// Cosine-weighted means around the texel directions of an `out`² map: irradiance ÷ π.
-    pub fn cosine(capture: usize, out: usize) -> Kernel {
-        Kernel::lobe(capture, out, 1.0)
+    /// Cosine-weighted means around each of `axes`, unit: irradiance ÷ π.
+    pub fn cosine(captured: &Directions, axes: &[Vec3]) -> Kernel {
+        Kernel::lobe(captured, axes, 1.0)
     }
 
-    /// Means under max(0, ω·d)^`exponent`.
-    pub fn lobe(capture: usize, out: usize, exponent: f32) -> Kernel {
-        let entries = (Kernel::entries(capture, out, exponent) * 1.02) as usize;
+    /// Means under max(0, ω·d)^`exponent` around each of `axes`, unit.
+    pub fn lobe(captured: &Directions, axes: &[Vec3], exponent: f32) -> Kernel {
+        let entries = (Kernel::entries(captured.texels(), axes.len(), exponent) * 1.02) as usize;
         let mut kernel = Kernel { row_start: vec![0], entries: Vec::with_capacity(entries) };
-        let points = quadrature(capture);
-        for o in 0..out * out {
-            let axis = texel_direction(o % out, o / out, out);
-            let row: Vec<f32> = points
-                .iter()
-                .map(|texel| texel.iter().map(|(d, w)| axis.dot(*d).max(0.0).powf(exponent) * w).sum())
-                .collect();
+        for axis in axes {
+            let texel = |texel: &[(Vec3, f32)]| -> f32 {
+                texel.iter().map(|(d, w)| axis.dot(*d).max(0.0).powf(exponent) * w).sum()
+            };
+            let row: Vec<f32> = captured.all.chunks(captured.per_texel).map(texel).collect();
             kernel.push_row(&row);
         }
         kernel
     }
 
-    /// About how many weights a kernel has: capture texels in the cap around each output direction whose lobe is not
-    /// [`NEGLIGIBLE`]. A cap within the angle θ is (1 − cos θ)/2 of the sphere.
-    fn entries(capture: usize, out: usize, exponent: f32) -> f64 {
+    /// About how many weights a kernel has: captured texels in the cap around each axis whose lobe is not [`NEGLIGIBLE`].
+    /// A cap within the angle θ is (1 − cos θ)/2 of the sphere.
+    fn entries(texels: usize, axes: usize, exponent: f32) -> f64 {
         let share = (1.0 - f64::from(NEGLIGIBLE).powf(1.0 / f64::from(exponent))) / 2.0;
-        (out * out) as f64 * (capture * capture) as f64 * share
+        axes as f64 * texels as f64 * share
     }
 
     /// Memory of a kernel while it is made.
-    pub fn bytes(capture: usize, out: usize, exponent: f32) -> u64 {
-        let quadrature = (capture * capture * QUADRATURE * QUADRATURE * size_of::<(Vec3, f32)>()) as u64;
+    pub fn bytes(texels: usize, axes: usize, exponent: f32) -> u64 {
+        let quadrature = (texels * QUADRATURE * QUADRATURE * size_of::<(Vec3, f32)>()) as u64;
         // `as` saturates.
-        (Kernel::entries(capture, out, exponent) * size_of::<(u32, f32)>() as f64) as u64 + quadrature
+        (Kernel::entries(texels, axes, exponent) * size_of::<(u32, f32)>() as f64) as u64 + quadrature
     }
 
     fn push_row(&mut self, weights: &[f32]) {
@@ -134,28 +136,19 @@ impl Kernel {
     }
 }
 
-/// Directions in every capture texel with the solid angle that each stands for.
-fn quadrature(resolution: usize) -> Vec<[(Vec3, f32); QUADRATURE * QUADRATURE]> {
-    let fine = (resolution * QUADRATURE) as f32;
-    let texel = |t: usize| {
-        let corner = Vec2::new((t % resolution) as f32, (t / resolution) as f32) * QUADRATURE as f32;
-        std::array::from_fn(|i| {
-            let inside = Vec2::new((i % QUADRATURE) as f32 + 0.5, (i / QUADRATURE) as f32 + 0.5);
-            let oct = (corner + inside) / fine * 2.0 - 1.0;
-            (direction_from_oct(oct), solid_angle_density(oct))
-        })
-    };
-    (0..resolution * resolution).map(texel).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::octahedral::texel_direction;
+
+    fn axes(n: usize) -> Vec<Vec3> {
+        (0..n * n).map(|o| texel_direction(o % n, o / n, n)).collect()
+    }
 
     #[test]
     fn constant_radiance_gives_pi_times_it() {
         for (capture, out) in [(8, 6), (16, 8), (5, 1)] {
-            let kernel = Kernel::cosine(capture, out);
+            let kernel = Kernel::cosine(&Directions::octahedral(capture), &axes(out));
             let mut e = vec![Vec3A::ZERO; out * out];
             kernel.irradiance(&vec![Vec3A::ONE; capture * capture], &mut e);
             // Rows are normalised in f64; what is left is the rounding of a sum of f32.
@@ -167,7 +160,7 @@ mod tests {
     fn linear_radiance_has_its_closed_form() {
         // L(ω) = 1 + ω·z: E(n) = π + (2π/3) n·z.
         let (capture, out) = (32, 8);
-        let kernel = Kernel::cosine(capture, out);
+        let kernel = Kernel::cosine(&Directions::octahedral(capture), &axes(out));
         let radiance: Vec<Vec3A> = (0..capture * capture)
             .map(|t| Vec3A::splat(1.0 + texel_direction(t % capture, t / capture, capture).z))
             .collect();
@@ -193,7 +186,7 @@ mod tests {
                 m
             })
             .collect();
-        let filtered = Kernel::lobe(capture, out, 50.0).distance(&texels);
+        let filtered = Kernel::lobe(&Directions::octahedral(capture), &axes(out), 50.0).distance(&texels);
         // Row 7 of 15 runs through the pole along x; column 7 is the pole +Z, on the rim between the halves.
         let (rim, pole) = (&filtered[7 * 15 + 7], &filtered[7 * 15 + 14]);
         assert!((rim.mean() - 2.0).abs() < 1e-3 && (rim.variance() - 1.0).abs() < 1e-3, "{rim:?}");

@@ -12,12 +12,47 @@
 //! a probe farther away that it does see.
 
 use glam::{UVec3, Vec3};
+use safetensors::Dtype;
+use serde::{Deserialize, Serialize};
 
+use crate::probe::container::Container;
+use crate::probe::lattice::grid::{Cell, CellIndex, Grid, ProbeIndex};
 use crate::probe::lattice::ProbeState;
-use crate::probe::lattice::grid::{Grid, ProbeIndex};
 
 /// Most voxels per cell and axis: 22³·6 keys fit 16 bits.
 pub const MAX_VOXELS_PER_CELL: u32 = 22;
+
+/// How finely visibility is measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SurfaceStore {
+    /// Voxels along each axis of a cell.
+    pub voxels_per_cell: u32,
+}
+
+impl Default for SurfaceStore {
+    fn default() -> Self {
+        SurfaceStore { voxels_per_cell: 8 }
+    }
+}
+
+/// How a look-up reads the table.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TableTest {
+    /// Where the survey found no surface of this facing in a point's own voxel, the nearest entry within this many voxels
+    /// stands in.
+    pub reach_voxels: u32,
+    /// Points nearer to a voxel's border than this share of its side may use the voxel beyond, where their own sees no
+    /// probe: where walls meet, the survey may miss a strip much narrower than a voxel.
+    pub strip: f32,
+}
+
+impl Default for TableTest {
+    fn default() -> Self {
+        TableTest { reach_voxels: 3, strip: 0.25 }
+    }
+}
 
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SurfaceVisibility {
@@ -49,26 +84,21 @@ pub struct Entry {
     pub index: usize,
 }
 
-/// Where the survey found no surface of this facing in a point's own voxel, one this many voxels away may stand in.
-const MISSED_REACH: u32 = 3;
-
-/// Points nearer to a voxel's border than this share of its side may use the voxel beyond.
-const STRIP: f32 = 0.25;
-
 impl SurfaceVisibility {
-    /// What a surface point sees: everything where no surface is known, nothing where only others are.
-    pub fn look_up(&self, grid: &Grid, position: Vec3, facing: Facing) -> Seen {
-        let cell = grid.cell(position);
+    /// What a point of a cell sees: everything where no surface is known, nothing where only others are. `at` is a point
+    /// of the cell, or stands for its nearest one; `facing` is the surface's main direction.
+    pub fn look_up(&self, grid: &Grid, cell: &Cell, at: Vec3, facing: Facing, test: &TableTest) -> Seen {
         let n = self.voxels_per_cell;
-        let index = grid.cell_index(cell.base);
+        let fraction = grid.fraction_in(cell, at);
+        let index = grid.cell_index(cell).0 as usize;
         let first = self.cell_start[index] as usize;
         let keys = &self.keys[first..self.cell_start[index + 1] as usize];
-        let wanted = key(voxel_of(cell.fraction, n), facing, n);
+        let wanted = key(voxel_of(fraction, n), facing, n);
         // The survey covers the grid's hull; beyond it the nearest surface of the rim has to do.
-        let surveyed = grid.is_within(position) && !keys.is_empty();
+        let surveyed = grid.is_within(at) && !keys.is_empty();
         let found = match keys.binary_search(&wanted) {
             Ok(found) => Some(found),
-            Err(_) => nearest_entry(keys, wanted, n, if surveyed { MISSED_REACH } else { 2 * n }),
+            Err(_) => nearest_entry(keys, wanted, n, if surveyed { test.reach_voxels } else { 2 * n }),
         };
         let Some(found) = found else {
             return Seen { mask: if surveyed { 0 } else { u8::MAX }, far: None };
@@ -77,22 +107,22 @@ impl SurfaceVisibility {
         if mask != 0 {
             return Seen { mask, far: None };
         }
-        let beside = self.beside(keys, first, cell.fraction, facing);
+        let beside = self.beside(keys, first, fraction, facing, test.strip);
         Seen { mask: beside, far: if beside == 0 { self.far_probe(first + found) } else { None } }
     }
 
     /// Mask of the voxel across a border that the point is close to, 0 where there is none.
     ///
     /// Where walls meet, the survey may miss a strip much narrower than a voxel; it continues in the next one.
-    fn beside(&self, keys: &[u16], first: usize, fraction: Vec3, facing: Facing) -> u8 {
+    fn beside(&self, keys: &[u16], first: usize, fraction: Vec3, facing: Facing, strip: f32) -> u8 {
         let n = self.voxels_per_cell;
         let voxel = voxel_of(fraction, n);
         let inside = fraction * n as f32 - voxel.as_vec3();
         // Along each axis: towards the nearer border, if near enough and within the cell.
         let last = n - 1;
         let step = |axis: usize| match inside[axis] {
-            x if x < STRIP && voxel[axis] > 0 => Some(voxel[axis] - 1),
-            x if x > 1.0 - STRIP && voxel[axis] < last => Some(voxel[axis] + 1),
+            x if x < strip && voxel[axis] > 0 => Some(voxel[axis] - 1),
+            x if x > 1.0 - strip && voxel[axis] < last => Some(voxel[axis] + 1),
             _ => None,
         };
         let steps = [step(0), step(1), step(2)];
@@ -119,18 +149,16 @@ impl SurfaceVisibility {
 
     /// Whether no entry hides an active probe: then the table says nothing.
     pub fn all_visible(&self, grid: &Grid, states: &[ProbeState]) -> bool {
-        (0..self.cell_start.len().saturating_sub(1)).all(|c| {
-            let range = self.cell_start[c] as usize..self.cell_start[c + 1] as usize;
-            let active = active_corners(grid, states, grid.cell_base(c));
-            self.masks[range].iter().all(|mask| mask & active == active)
+        grid.cells().all(|cell| {
+            let active = active_corners(grid, states, cell);
+            self.masks[self.range(cell)].iter().all(|mask| mask & active == active)
         })
     }
 
     /// What is known about one cell.
-    pub fn entries(&self, cell: usize) -> impl Iterator<Item = Entry> + '_ {
+    pub fn entries(&self, cell: CellIndex) -> impl Iterator<Item = Entry> + '_ {
         let n = self.voxels_per_cell;
-        let range = self.cell_start[cell] as usize..self.cell_start[cell + 1] as usize;
-        range.map(move |i| {
+        self.range(cell).map(move |i| {
             let facing = u32::from(self.keys[i]) % 6;
             let sign = if facing.is_multiple_of(2) { 1.0 } else { -1.0 };
             Entry {
@@ -140,6 +168,11 @@ impl SurfaceVisibility {
                 index: i,
             }
         })
+    }
+
+    /// Where a cell's entries are.
+    fn range(&self, CellIndex(cell): CellIndex) -> std::ops::Range<usize> {
+        self.cell_start[cell as usize] as usize..self.cell_start[cell as usize + 1] as usize
     }
 
     /// Bytes of its tensors.
@@ -190,9 +223,62 @@ fn nearest_entry(keys: &[u16], wanted: u16, n: u32, reach: u32) -> Option<usize>
 }
 
 /// Bit i: whether corner i of the cell is an active probe.
-pub fn active_corners(grid: &Grid, states: &[ProbeState], base: UVec3) -> u8 {
-    (0..8).fold(0, |mask, i| {
-        let probe = grid.corner(base, i).0 as usize;
-        mask | u8::from(states[probe] == ProbeState::Active) << i
-    })
+pub fn active_corners(grid: &Grid, states: &[ProbeState], cell: CellIndex) -> u8 {
+    let corners = grid.corners(cell);
+    (0..8).fold(0, |mask, i| mask | u8::from(states[corners[i].0 as usize] == ProbeState::Active) << i)
+}
+
+/// Names in the file.
+const MASKS: &str = "visibility";
+const KEYS: &str = "visibility_key";
+const STARTS: &str = "visibility_start";
+const FAR: &str = "visibility_far";
+const VOXELS_KEY: &str = "visibility.voxels_per_cell";
+
+/// Whether a file holds a table.
+pub fn is_in(container: &Container) -> bool {
+    container.has(MASKS)
+}
+
+/// Writes the table.
+pub fn write(table: &SurfaceVisibility, container: &mut Container) {
+    let n = table.keys.len();
+    let starts = table.cell_start.iter().map(|s| s.to_le_bytes());
+    container.put(STARTS, Dtype::U32, &[table.cell_start.len()], starts);
+    container.put(KEYS, Dtype::U16, &[n], table.keys.iter().map(|k| k.to_le_bytes()));
+    container.put_bytes(MASKS, Dtype::U8, &[n], table.masks.clone());
+    if !table.far.is_empty() {
+        let far = table.far.iter().flat_map(|&(entry, probe)| [entry, probe]).map(u32::to_le_bytes);
+        container.put(FAR, Dtype::U32, &[table.far.len(), 2], far);
+    }
+    container.put_json(VOXELS_KEY, &table.voxels_per_cell);
+}
+
+/// Reads the table; inverse of [`write`].
+///
+/// # Errors
+/// What is missing, or points to what is not there.
+pub fn read(container: &Container, grid: &Grid) -> Result<SurfaceVisibility, String> {
+    let voxels_per_cell: u32 = container.json(VOXELS_KEY)?;
+    if !(1..=MAX_VOXELS_PER_CELL).contains(&voxels_per_cell) {
+        return Err(format!("metadata '{VOXELS_KEY}' is {voxels_per_cell}"));
+    }
+    let masks = container.tensor(MASKS, &[Dtype::U8], &[None])?.bytes.clone();
+    let keys = container.tensor(KEYS, &[Dtype::U16], &[Some(masks.len())])?.u16s().collect();
+    let cells = grid.cell_count();
+    let cell_start: Vec<u32> = container.tensor(STARTS, &[Dtype::U32], &[Some(cells + 1)])?.u32s().collect();
+    let ordered = cell_start.is_sorted() && cell_start.last().is_some_and(|&n| n as usize == masks.len());
+    if !ordered || cell_start[0] != 0 {
+        return Err(format!("tensor '{STARTS}' does not divide the entries among the cells"));
+    }
+    let mut far = Vec::new();
+    if container.has(FAR) {
+        let numbers: Vec<u32> = container.tensor(FAR, &[Dtype::U32], &[None, Some(2)])?.u32s().collect();
+        far = numbers.as_chunks::<2>().0.iter().map(|pair| (pair[0], pair[1])).collect();
+        let in_range = |f: &(u32, u32)| (f.0 as usize) < masks.len() && (f.1 as usize) < grid.probe_count();
+        if !far.is_sorted() || !far.iter().all(in_range) {
+            return Err(format!("tensor '{FAR}' names entries or probes that do not exist"));
+        }
+    }
+    Ok(SurfaceVisibility { voxels_per_cell, cell_start, keys, masks, far })
 }

@@ -10,7 +10,7 @@ use glam::{BVec3, DVec3, Vec3};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::probe::transport::operator::Field;
+use super::operator::Field;
 
 /// Most differences that are kept: as many as stiff scenes take sweeps.
 const WINDOW: usize = 20;

@@ -1,21 +1,21 @@
-//! What an interrupted bake leaves behind: the probes' irradiance after the last finished sweep, and what the solver
-//! remembers of the sweeps before.
+//! What an interrupted bake leaves behind: the probes' irradiance after the last finished iteration, and what the solver
+//! remembers of those before.
 //!
-//! Captures are traced again on resumption — the same seed gives the same — so only the sweeps are saved.
+//! Captures are traced again on resumption — the same seed gives the same — so only the iterations are saved.
 
 use std::path::{Path, PathBuf};
 
-use glam::{DVec3, Vec3, Vec3A};
+use glam::{DVec3, Vec3};
 use safetensors::Dtype;
 
-use crate::probe::file::container::{Container, FileError, Tensor};
-use crate::probe::store::volume::Volume;
-use crate::probe::transport::anderson::History;
-use crate::probe::transport::operator::Field;
-use crate::probe::transport::solver::{Solution, State};
+use super::anderson::History;
+use super::operator::Field;
+use super::solver::{Control, Progress, Solution};
+use crate::probe::Volume;
+use crate::probe::container::{Container, FileError, Tensor};
 
 /// Value of the metadata key `format`.
-const FORMAT: &str = "lightprobe-resume/2";
+const FORMAT: &str = "lightprobe-resume/3";
 
 /// Where the checkpoint of an output lies.
 pub fn path_for(output: &Path) -> PathBuf {
@@ -25,10 +25,9 @@ pub fn path_for(output: &Path) -> PathBuf {
 }
 
 /// Writes a checkpoint. `identity` names scene, configuration and seed: whatever the result depends on.
-pub fn write(path: &Path, identity: &str, progress: &State, volume: &Volume) -> Result<(), FileError> {
+pub fn write(path: &Path, identity: &str, progress: &Progress, volume: &Volume) -> Result<(), FileError> {
     let mut container = Container::default();
-    let texels = &volume.irradiance.texels;
-    container.tensors.insert("irradiance".into(), tensor(texels.iter().map(|&t| t.into())));
+    container.tensors.insert("irradiance".into(), tensor(volume.irradiance.stored()));
     if let Some(history) = &progress.history {
         let (fields, noise) = history.fields();
         for (i, field) in fields.into_iter().enumerate() {
@@ -40,7 +39,7 @@ pub fn write(path: &Path, identity: &str, progress: &State, volume: &Volume) -> 
     container.metadata.insert("format".into(), FORMAT.into());
     container.metadata.insert("identity".into(), identity.into());
     // Plain numbers: nothing in them can fail to serialise.
-    container.metadata.insert("progress".into(), serde_json::to_string(&progress.solution).unwrap_or_default());
+    container.metadata.insert("progress".into(), serde_json::to_string(&(&progress.solution, &progress.control)).unwrap_or_default());
     container.write(path).map(|_| ())
 }
 
@@ -50,26 +49,26 @@ pub fn identity(scene_blake3: &str, seed: u64, config: &str) -> String {
 }
 
 /// Reads a checkpoint into the volume and returns how far it had come.
-pub fn read(path: &Path, identity: &str, volume: &mut Volume) -> Result<State, FileError> {
-    let (solution, container) = load(path, identity)?;
+pub fn read(path: &Path, identity: &str, volume: &mut Volume) -> Result<Progress, FileError> {
+    let ((solution, control), container) = load(path, identity)?;
     let unusable = |what: &str| FileError::NoCheckpoint { path: path.to_owned(), what: what.to_owned() };
-    let texels = field(&container, "irradiance").filter(|texels| texels.len() == volume.irradiance.texels.len());
-    let texels = texels.ok_or_else(|| unusable("its irradiance is not that of this grid"))?;
-    volume.irradiance.texels = texels.into_iter().map(Vec3A::from).collect();
-    let interior = volume.active_count() * volume.irradiance.resolution.pow(2);
+    if !field(&container, "irradiance").is_some_and(|stored| volume.irradiance.restore(&stored)) {
+        return Err(unusable("its irradiance is not that of this grid"));
+    }
+    let unknowns = volume.active_count() * volume.irradiance.unknowns();
     let history = match container.metadata.get("history") {
         None => None,
         Some(noise) => Some(
-            history(&container, noise, interior).ok_or_else(|| unusable("its earlier sweeps are not of this grid"))?,
+            history(&container, noise, unknowns).ok_or_else(|| unusable("its earlier iterations are not of this grid"))?,
         ),
     };
-    Ok(State { solution, history })
+    Ok(Progress { solution, control, history })
 }
 
-fn history(container: &Container, noise: &str, interior: usize) -> Option<History> {
+fn history(container: &Container, noise: &str, unknowns: usize) -> Option<History> {
     let noise: Vec<[f64; 3]> = serde_json::from_str(noise).ok()?;
     let fields = (0..).map_while(|i| field(container, &field_name(i))).collect();
-    History::from_fields(interior, fields, noise.into_iter().map(DVec3::from).collect())
+    History::from_fields(unknowns, fields, noise.into_iter().map(DVec3::from).collect())
 }
 
 /// Name of the tensor that holds one of the fields that the solver remembers.
@@ -105,7 +104,7 @@ fn is_checkpoint(container: &Container) -> bool {
     container.metadata.get("format").is_some_and(|format| format == FORMAT)
 }
 
-fn load(path: &Path, identity: &str) -> Result<(Solution, Container), FileError> {
+fn load(path: &Path, identity: &str) -> Result<((Solution, Control), Container), FileError> {
     let unusable = |what: &str| FileError::NoCheckpoint { path: path.to_owned(), what: what.to_owned() };
     let container = Container::read(path).map_err(|error| match error {
         FileError::Damaged { what, .. } => unusable(&format!("it is damaged or no resume file ({what})")),
@@ -117,10 +116,10 @@ fn load(path: &Path, identity: &str) -> Result<(Solution, Container), FileError>
     if container.metadata.get("identity").map(String::as_str) != Some(identity) {
         return Err(FileError::OtherBake { path: path.to_owned() });
     }
-    let solution = container.metadata.get("progress").and_then(|text| serde_json::from_str(text).ok());
-    let solution = solution.ok_or_else(|| unusable("its progress is unreadable"))?;
+    let found = container.metadata.get("progress").and_then(|text| serde_json::from_str(text).ok());
+    let found = found.ok_or_else(|| unusable("its progress is unreadable"))?;
     if field(&container, "irradiance").is_none() {
         return Err(unusable("it holds no irradiance"));
     }
-    Ok((solution, container))
+    Ok((found, container))
 }

@@ -3,5 +3,24 @@
 pub mod anderson;
 pub mod checkpoint;
 pub mod operator;
+mod settings;
 pub mod solver;
 pub mod truth;
+
+pub use self::settings::{Acceleration, BounceSettings, Transport};
+use self::operator::{Captures, Operator};
+use self::solver::{Progress, Solution};
+use super::Volume;
+
+/// Fills the volume's irradiance with the light that `transport` brings. The volume's positions, states and occlusion must
+/// stand already; after an interruption its irradiance too, as it was when `progress` was reported.
+pub fn run<C: Captures>(
+    transport: &Transport,
+    operator: &Operator<C>,
+    volume: &mut Volume,
+    progress: Progress,
+    on_iteration: impl FnMut(&Progress, &Volume),
+) -> Solution {
+    let solution = solver::solve(operator, &transport.iteration(), volume, progress, on_iteration);
+    Solution { converged: solution.converged || transport.is_complete(), ..solution }
+}

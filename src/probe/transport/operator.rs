@@ -1,8 +1,8 @@
-//! The bounce operator: one sweep takes the light from the probes to the surfaces they captured and back.
+//! The bounce operator: one application takes the light from the probes to the surfaces they captured and back.
 //!
-//! With E the irradiance in the probes, one sweep gives `G[B⁰] + T·E`, `T = G[ρ/π·Q[E]]`: Q asks the probes at every
-//! captured hit with the method's own weights, G is the irradiance filter, B⁰ the radiance that hits reflect of light that
-//! did not pass through probes.
+//! With E the irradiance in the probes it gives `G[B⁰] + T·E`, `T = G[ρ/π·Q[E]]`: Q asks the probes at every captured hit
+//! with the method's own weights, G is the irradiance filter, B⁰ the radiance that hits reflect of light that did not pass
+//! through probes.
 
 use std::time::Instant;
 
@@ -11,14 +11,13 @@ use rayon::prelude::*;
 
 use crate::light::lambert::reflected_radiance;
 use crate::math::color::luminance;
-use crate::math::octahedral::{direction_from_oct, texel_direction};
+use crate::math::octahedral::direction_from_oct;
+use crate::probe::Volume;
 use crate::probe::capture::ProbeCapture;
 use crate::probe::capture::surfel::Surfel;
 use crate::probe::lattice::ProbeState;
 use crate::probe::query::{Query, QueryPoint, QuerySettings, Visibility};
 use crate::probe::store::kernel::Kernel;
-use crate::probe::store::map::{fill_with_border, interior_texel};
-use crate::probe::store::volume::{IrradianceCurve, Volume};
 
 /// Where the captures of all probes come from: memory, or traced again.
 pub trait Captures: Sync {
@@ -32,11 +31,11 @@ impl Captures for Vec<ProbeCapture> {
     }
 }
 
-/// Irradiance of all interior texels, row by row, of all active probes in their order, W·m⁻²: what a sweep works on.
+/// The linear unknowns of all active probes in their order, W·m⁻²: what the operator works on.
 pub type Field = Vec<Vec3>;
 
-/// The operator, with all that stays the same from sweep to sweep.
-pub struct Sweep<'a, C> {
+/// The operator, with all that stays the same from one application to the next.
+pub struct Operator<'a, C> {
     pub captures: &'a C,
     pub kernel: &'a Kernel,
     pub query: &'a QuerySettings,
@@ -44,14 +43,14 @@ pub struct Sweep<'a, C> {
     pub gathers_emission: bool,
 }
 
-/// Of every probe's surfels: the corners of its cell that it sees, 0 where it must be looked up again. Empty where the
-/// method does not store visibility at surfaces.
+/// For every surfel of every probe the corners of its cell that it sees, so that they need not be looked up again;
+/// 0 where they must be.
 pub struct Masks(Vec<Vec<u8>>);
 
-impl<C: Captures> Sweep<'_, C> {
+impl<C: Captures> Operator<'_, C> {
     /// Whether the operator is linear (affine): sums and differences of fields may be put into it.
     pub fn is_linear(&self, volume: &Volume) -> bool {
-        self.query.blend.is_linear() && volume.curve == IrradianceCurve::Linear
+        self.query.is_linear() && volume.irradiance.is_linear()
     }
 
     /// Neither surfels nor probes move, so once is enough.
@@ -64,19 +63,18 @@ impl<C: Captures> Sweep<'_, C> {
     }
 
     fn masks_of(&self, volume: &Volume, p: usize) -> Vec<u8> {
-        let Some(surface) = &volume.surface_visibility else { return Vec::new() };
-        self.captures.with(p, |capture| {
-            capture.surfels.iter().map(|s| surface.look_up(&volume.grid, s.position, s.facing).mask).collect()
-        })
+        let query = Query { volume, settings: self.query };
+        let mask = |s: &Surfel| query.stored_mask(&self.query_point(s, volume.positions[p]));
+        self.captures.with(p, |capture| capture.surfels.iter().map(mask).collect())
     }
 
     /// Irradiance of every probe from the outgoing radiance that the present irradiance gives; without `masks` from the
     /// direct radiance alone. Also how many hits' radiance was not finite and left out.
     pub fn apply(&self, volume: &Volume, masks: Option<&Masks>) -> (Field, u64) {
         let of_probe = |p: usize| self.apply_to(volume, p, masks.map(|masks| masks.0[p].as_slice()));
-        let swept = self.gather(volume, of_probe);
-        let non_finite = swept.iter().map(|(_, lost)| lost).sum();
-        (swept.into_iter().flat_map(|(irradiance, _)| irradiance).map(Vec3::from).collect(), non_finite)
+        let found = self.gather(volume, of_probe);
+        let non_finite = found.iter().map(|(_, lost)| lost).sum();
+        (found.into_iter().flat_map(|(irradiance, _)| irradiance).map(Vec3::from).collect(), non_finite)
     }
 
     /// The operator's norm ‖T‖∞ per channel: the most that it makes of irradiance 1 everywhere, and so a bound of its
@@ -104,7 +102,7 @@ impl<C: Captures> Sweep<'_, C> {
         (0..volume.states.len()).into_par_iter().filter(active).map(of_probe).collect()
     }
 
-    /// A sweep at one active probe, with the masks of its own surfels.
+    /// One application at one active probe, with the masks of its own surfels.
     fn apply_to(&self, volume: &Volume, p: usize, masks: Option<&[u8]>) -> (Vec<Vec3A>, u64) {
         let kernel = self.kernel;
         let query = Query { volume, settings: self.query };
@@ -115,9 +113,9 @@ impl<C: Captures> Sweep<'_, C> {
             for (i, surfel) in capture.surfels.iter().enumerate() {
                 let mut outgoing = surfel.direct_radiance;
                 if let Some(masks) = masks {
-                    let visibility = match masks.get(i) {
-                        None | Some(0) => Visibility::Stored,
-                        Some(&mask) => Visibility::Exact(mask),
+                    let visibility = match masks[i] {
+                        0 => Visibility::Stored,
+                        mask => Visibility::Exact(mask),
                     };
                     let weights = query.weights(&self.query_point(surfel, volume.positions[p]), visibility);
                     outgoing += reflected_radiance(surfel.albedo(), query.blend(&weights, surfel.oct()));
@@ -134,32 +132,29 @@ impl<C: Captures> Sweep<'_, C> {
         })
     }
 
-    /// Seconds that a sweep over these probes takes.
+    /// Seconds that one application at these probes takes.
     pub fn time(&self, volume: &Volume, probes: &[usize]) -> f64 {
         let masks: Vec<Vec<u8>> = probes.par_iter().map(|&p| self.masks_of(volume, p)).collect();
         let started = Instant::now();
-        let sweep = |(&p, masks): (&usize, &Vec<u8>)| self.apply_to(volume, p, Some(masks));
-        std::hint::black_box(probes.par_iter().zip(&masks).map(sweep).collect::<Vec<_>>());
+        let apply = |(&p, masks): (&usize, &Vec<u8>)| self.apply_to(volume, p, Some(masks));
+        std::hint::black_box(probes.par_iter().zip(&masks).map(apply).collect::<Vec<_>>());
         started.elapsed().as_secs_f64()
     }
 
     /// How a probe asks for the light at a surfel. What the method does not look at is left zero.
     fn query_point(&self, surfel: &Surfel, probe: Vec3) -> QueryPoint {
-        let normal = if self.query.weighs_by_normal() { direction_from_oct(surfel.oct()) } else { Vec3::ZERO };
-        let view = if self.query.view_bias != 0.0 { (probe - surfel.position).normalize_or_zero() } else { Vec3::ZERO };
+        let normal = if self.query.needs_normal() { direction_from_oct(surfel.oct()) } else { Vec3::ZERO };
+        let view = if self.query.needs_view() { (probe - surfel.position).normalize_or_zero() } else { Vec3::ZERO };
         QueryPoint { position: surfel.position, normal, facing: surfel.facing, view }
     }
 
     /// Adds the emitted light that probes see themselves: from their rays and from the emitters sampled at their centres.
-    /// Returns the mean luminance of the irradiance added, over all interior texels of active probes.
+    /// Returns the mean luminance of the irradiance added, over all unknowns of active probes.
     pub fn add_emission(&self, volume: &mut Volume) -> f64 {
         let kernel = self.kernel;
-        let (resolution, border) = (volume.irradiance.resolution, volume.irradiance.border);
-        let interior = interior_texel(resolution, border);
-        let curve = volume.curve;
-        let n = volume.irradiance.texels_per_probe();
+        let axes = volume.irradiance.axes();
         let states = &volume.states;
-        let add = |(p, out): (usize, &mut [Vec3A])| {
+        let add = |p: usize, before: &mut dyn Iterator<Item = Vec3A>| {
             if states[p] != ProbeState::Active {
                 return None;
             }
@@ -167,48 +162,33 @@ impl<C: Captures> Sweep<'_, C> {
                 let mut emitted = vec![Vec3A::ZERO; kernel.rows()];
                 let mut energy = 0.0;
                 kernel.irradiance(&capture.emitted_radiance(), &mut emitted);
-                for (o, value) in emitted.iter_mut().enumerate() {
-                    let at = interior(o);
-                    let normal = texel_direction(o % resolution, o / resolution, resolution);
-                    *value += Vec3A::from(capture.sampled_emitter_irradiance(normal));
+                for ((value, (normal, _)), before) in emitted.iter_mut().zip(&axes).zip(before) {
+                    *value += Vec3A::from(capture.sampled_emitter_irradiance(*normal));
                     energy += f64::from(luminance((*value).into()));
-                    *value = curve.encode(*value + curve.decode(out[at]));
+                    *value += before;
                 }
-                fill_with_border(&emitted, resolution, border, out);
-                Some(energy)
+                Some((emitted, energy))
             })
         };
         // Summed in order, on one thread: the same for any number of threads.
-        let energies: Vec<Option<f64>> = volume.irradiance.texels.par_chunks_mut(n).enumerate().map(add).collect();
-        let texels = energies.iter().flatten().count() * kernel.rows();
-        energies.iter().flatten().sum::<f64>() / texels.max(1) as f64
+        let energies: Vec<Option<f64>> = volume.irradiance.set_each(add);
+        let unknowns = energies.iter().flatten().count() * kernel.rows();
+        energies.iter().flatten().sum::<f64>() / unknowns.max(1) as f64
     }
 }
 
-/// The irradiance that the volume's texels now stand for.
+/// The unknowns that the volume's irradiance now stands for.
 pub fn field_of(volume: &Volume) -> Field {
-    let maps = &volume.irradiance;
-    let interior = interior_texel(maps.resolution, maps.border);
-    let of_probe = |p: usize| {
-        let map = maps.probe(p);
-        (0..maps.resolution * maps.resolution).map(move |o| Vec3::from(volume.curve.decode(map[interior(o)])))
-    };
-    active(volume).flat_map(of_probe).collect()
+    volume.active().flat_map(|p| volume.irradiance.probe(p)).collect()
 }
 
 /// Stores a field in the volume; the inverse of [`field_of`] up to the rounding of its curve.
 pub fn store(volume: &mut Volume, field: &[Vec3]) {
-    let (resolution, border, curve) = (volume.irradiance.resolution, volume.irradiance.border, volume.curve);
-    let n = volume.irradiance.texels_per_probe();
-    let states = &volume.states;
-    let maps = volume.irradiance.texels.chunks_mut(n).zip(states).filter(|(_, s)| **s == ProbeState::Active);
-    let pairs: Vec<_> = maps.zip(field.chunks(resolution * resolution)).collect();
-    pairs.into_par_iter().for_each(|((map, _), values)| {
-        let encoded: Vec<Vec3A> = values.iter().map(|&e| curve.encode(e.into())).collect();
-        fill_with_border(&encoded, resolution, border, map);
+    let unknowns = volume.irradiance.unknowns();
+    let mut place = vec![None; volume.states.len()];
+    volume.active().enumerate().for_each(|(i, p)| place[p] = Some(i));
+    volume.irradiance.set_each(|p, _| {
+        let values = field.chunks(unknowns).nth(place[p]?)?;
+        Some((values.iter().map(|&e| e.into()).collect(), ()))
     });
-}
-
-fn active(volume: &Volume) -> impl Iterator<Item = usize> {
-    (0..volume.states.len()).filter(|&p| volume.states[p] == ProbeState::Active)
 }

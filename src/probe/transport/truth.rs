@@ -8,12 +8,9 @@ use glam::Vec3A;
 use rayon::prelude::*;
 
 use crate::light::World;
-use crate::math::octahedral::texel_direction;
 use crate::probe::Volume;
-use crate::probe::capture::{Capture, CaptureSettings, ReflectedLight};
+use crate::probe::capture::{Capture, CaptureSettings, HitLight};
 use crate::probe::lattice::ProbeState;
-use crate::probe::store::kernel::Kernel;
-use crate::probe::store::map::fill_with_border;
 use crate::system::progress::Progress;
 
 /// Independent runs. Standard errors from eight are known to a quarter (1/√14).
@@ -24,15 +21,14 @@ const SEED_STEP: u64 = 0x5851_F42D_4C95_7F2D;
 
 /// A volume's probes lit by full paths.
 pub struct Truth {
-    /// Of every run, of every probe: interior texels row by row, W·m⁻²; empty for probes that are not active.
+    /// Of every run, of every probe: its unknowns, W·m⁻²; empty for probes that are not active.
     pub runs: Vec<Vec<Vec<Vec3A>>>,
     /// The mean of the runs, with all else of the volume that it is the truth of.
     pub volume: Volume,
 }
 
 impl Truth {
-    /// Traces `paths` paths in every run from each of the capture's hits; emitters, resolution and filter are those of
-    /// `settings`.
+    /// Traces `paths` paths in every run from each of the capture's hits; rays and emitters are those of `settings`.
     pub fn trace(
         world: &World,
         settings: &CaptureSettings,
@@ -41,15 +37,15 @@ impl Truth {
         seed: u64,
         progress: Progress,
     ) -> Truth {
-        let settings = CaptureSettings { reflected: ReflectedLight::PathTraced { paths }, ..settings.clone() };
-        let maps = &volume.irradiance;
-        let kernel = Kernel::cosine(settings.resolution, maps.resolution);
+        let kernel = volume.irradiance.kernel(&settings.rays.directions());
+        let axes = volume.irradiance.axes();
         let bar = progress.stage("path-traced probes", RUNS as usize * volume.active_count());
         let run = |run: u64| -> Vec<Vec<Vec3A>> {
             let capture = Capture {
                 world,
-                settings: &settings,
+                settings,
                 distance_clamp_m: None,
+                hit_light: HitLight::Paths(paths),
                 // Divides samples between techniques; any division has the same mean.
                 emitter_coverage: 0.0,
                 seed: seed.wrapping_add((run + 1).wrapping_mul(SEED_STEP)),
@@ -64,9 +60,8 @@ impl Truth {
                 traced.surfels.iter().for_each(|s| radiance[s.texel as usize] += Vec3A::from(s.direct_radiance));
                 let mut irradiance = vec![Vec3A::ZERO; kernel.rows()];
                 kernel.irradiance(&radiance, &mut irradiance);
-                for (o, value) in irradiance.iter_mut().enumerate() {
-                    let normal = texel_direction(o % maps.resolution, o / maps.resolution, maps.resolution);
-                    *value += Vec3A::from(traced.sampled_emitter_irradiance(normal));
+                for (value, (normal, _)) in irradiance.iter_mut().zip(&axes) {
+                    *value += Vec3A::from(traced.sampled_emitter_irradiance(*normal));
                 }
                 irradiance
             };
@@ -75,13 +70,11 @@ impl Truth {
         let runs: Vec<Vec<Vec<Vec3A>>> = (0..RUNS).map(run).collect();
         bar.finish_and_clear();
         let mut volume = volume.clone();
-        for p in (0..volume.states.len()).filter(|&p| volume.states[p] == ProbeState::Active) {
-            let texels = runs[0][p].len();
+        volume.irradiance.set_each(|p, _| {
+            let unknowns = runs[0][p].len();
             let mean = |o: usize| runs.iter().map(|run| run[p][o]).sum::<Vec3A>() / RUNS as f32;
-            let encoded: Vec<Vec3A> = (0..texels).map(|o| volume.curve.encode(mean(o))).collect();
-            let (resolution, border) = (volume.irradiance.resolution, volume.irradiance.border);
-            fill_with_border(&encoded, resolution, border, volume.irradiance.probe_mut(p));
-        }
+            (unknowns > 0).then(|| ((0..unknowns).map(mean).collect(), ()))
+        });
         Truth { runs, volume }
     }
 }

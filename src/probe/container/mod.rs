@@ -7,6 +7,8 @@
 //! `blake3` maps every tensor to the hash of its bytes, and `__header__` to that of the header as compact JSON with
 //! sorted keys and without the `blake3` key itself.
 
+mod tensors;
+
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -14,6 +16,7 @@ use std::path::{Path, PathBuf};
 use safetensors::{Dtype, SafeTensors};
 use serde_json::{Map, Value, json};
 
+pub use self::tensors::EncodingLosses;
 use crate::system::input::read_file;
 use crate::system::output::{OutputError, write_atomically};
 

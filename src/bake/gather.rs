@@ -1,0 +1,81 @@
+//! Capturing all probes, and keeping what fits into memory.
+
+use glam::Vec2;
+use rayon::prelude::*;
+
+use super::log::Log;
+use super::memory::surfels_bytes;
+use super::{Circumstances, Prepared};
+use crate::probe::capture::ProbeCapture;
+use crate::probe::store::Occlusion;
+use crate::probe::transport::operator::Captures;
+
+/// Probes that are traced before the next are begun: bounds the memory of what is not kept, and of replay's logs.
+pub const CHUNK: usize = 256;
+/// The same in bytes, where captures are large; but never fewer than there are threads.
+pub const CHUNK_BYTES: u64 = 256 << 20;
+
+/// Captures in memory as far as the budget goes; the others are traced again whenever they are asked for.
+pub struct Budgeted<'p, F> {
+    pub stored: Vec<Option<ProbeCapture>>,
+    pub trace: &'p F,
+}
+
+impl<F: Fn(usize) -> ProbeCapture + Sync> Captures for Budgeted<'_, F> {
+    fn with<R>(&self, probe: usize, visit: impl FnOnce(&ProbeCapture) -> R) -> R {
+        match &self.stored[probe] {
+            Some(capture) => visit(capture),
+            None => visit(&(self.trace)(probe)),
+        }
+    }
+}
+
+/// Captures every active probe; filters distances on the way, as their texels are not kept.
+pub fn gather<'p, F: Fn(usize) -> ProbeCapture + Sync>(
+    prepared: &Prepared,
+    trace: &'p F,
+    circumstances: &Circumstances,
+    log: &mut Log,
+) -> (Budgeted<'p, F>, Occlusion) {
+    let config = prepared.config;
+    let probes = prepared.grid.probe_count();
+    let active = prepared.active();
+    let mut stored: Vec<Option<ProbeCapture>> = (0..probes).map(|_| None).collect();
+    let mut occlusion = prepared.occlusion_builder();
+    let at_once = (CHUNK_BYTES / surfels_bytes(config).max(1)) as usize;
+    let at_once = at_once.clamp(rayon::current_num_threads().min(CHUNK), CHUNK);
+    let (mut rays, mut outside, mut non_finite, mut bytes) = ((0, 0), 0, 0, 0);
+    log.stage(
+        |times| &mut times.capture,
+        "capturing",
+        active.len(),
+        |bar| {
+            for chunk in active.chunks(at_once) {
+                let traced: Vec<(ProbeCapture, Vec<Vec2>)> = chunk
+                    .par_iter()
+                    .map(|&probe| {
+                        let mut capture = trace(probe);
+                        let filtered = occlusion.filter(&std::mem::take(&mut capture.distances));
+                        bar.inc(1);
+                        (capture, filtered)
+                    })
+                    .collect();
+                for (&probe, (capture, filtered)) in chunk.iter().zip(traced) {
+                    rays.0 += capture.rays.primary;
+                    rays.1 += capture.rays.shadow;
+                    outside += capture.hits_outside_volume;
+                    non_finite += capture.non_finite;
+                    occlusion.set(probe, &filtered);
+                    bytes += capture.bytes();
+                    if circumstances.memory_budget_bytes.is_none_or(|budget| bytes <= budget) {
+                        stored[probe] = Some(capture);
+                    }
+                }
+            }
+        },
+    );
+    (log.rays.primary, log.rays.shadow) = rays;
+    log.numerics.hits_outside_volume += outside;
+    log.numerics.non_finite += non_finite;
+    (Budgeted { stored, trace }, occlusion.finish())
+}

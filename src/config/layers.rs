@@ -1,0 +1,218 @@
+//! Layers of assignments, and the configuration that they make together.
+
+use std::path::Path;
+
+use ron::error::SpannedError;
+use serde_json::Value;
+
+use super::assignments::{self, Assignment, below, choice};
+use super::{Config, ConfigError, aliases, messages, presets};
+use crate::system::input::read_file;
+
+/// Assignments in the order in which they count: a later one replaces an earlier one.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Layers {
+    base: Config,
+    assignments: Vec<Assignment>,
+}
+
+impl Layers {
+    /// Layers over a configuration instead of the defaults.
+    pub fn over(base: Config) -> Layers {
+        Layers { base, assignments: Vec::new() }
+    }
+
+    /// Adds the keys that stand in RON text; `place` names it in errors.
+    ///
+    /// # Errors
+    /// The text is not RON in parentheses. Keys and values are looked at by [`Self::config`].
+    pub fn text(mut self, text: &str, place: &str) -> Result<Layers, ConfigError> {
+        self.assignments.extend(assignments::of_text(text, place)?);
+        Ok(self)
+    }
+
+    /// Adds the keys of a preset.
+    ///
+    /// # Errors
+    /// There is no such preset.
+    pub fn preset(self, name: &str) -> Result<Layers, ConfigError> {
+        self.text(presets::find(name)?.text, &format!("preset {name}"))
+    }
+
+    /// Adds the keys that stand in a file.
+    ///
+    /// # Errors
+    /// As [`Self::text`]; the file cannot be read.
+    pub fn file(self, path: &Path) -> Result<Layers, ConfigError> {
+        let unreadable = |cause| ConfigError::Unreadable { path: path.to_owned(), cause };
+        let bytes = read_file(path).map_err(unreadable)?;
+        let text = String::from_utf8(bytes).map_err(|e| unreadable(std::io::Error::other(e.utf8_error())))?;
+        self.text(&text, &path.display().to_string())
+    }
+
+    /// Adds `key=value` assignments. Values are RON as in a file, for example `0.5`, `f32`, `(3, 4, 5)` or
+    /// `surface(voxels_per_cell: 4)`.
+    ///
+    /// # Errors
+    /// One is not written as key=value.
+    pub fn set(mut self, assignments: &[String]) -> Result<Layers, ConfigError> {
+        for text in assignments {
+            self.assignments.push(assignments::of_set(text)?);
+        }
+        Ok(self)
+    }
+
+    /// The configuration that all layers make.
+    ///
+    /// # Errors
+    /// Keys or values that a configuration does not take, or that do not go together; the message names the place.
+    pub fn config(&self) -> Result<Config, ConfigError> {
+        let mut tree = Tree::new(&self.base);
+        // Old keys of a choice that is not taken (yet): a later assignment may take it.
+        let mut waiting: Vec<Assignment> = Vec::new();
+        for assignment in &self.assignments {
+            tree.apply(assignment, &mut waiting)?;
+        }
+        for assignment in waiting {
+            tree.apply(&assignment, &mut Vec::new())?;
+        }
+        let place = self.assignments.last().map_or("the configuration", |a| &a.place);
+        let invalid = |place: &str, what: String| Err(ConfigError::Invalid { place: place.to_owned(), what });
+        let config = tree.config;
+        if config.grid.spacing_m.is_some() && config.grid.divisions.is_some() {
+            let ends = |a: &&Assignment| a.path.ends_with("divisions") || a.path.ends_with("spacing_m");
+            let last = self.assignments.iter().rfind(ends);
+            let key = if last.is_some_and(|a| a.path.ends_with("divisions")) { "spacing_m" } else { "divisions" };
+            let what = format!("grid.{key} is given too; remove one, or put --set grid.{key}=None before");
+            return invalid(last.map_or(place, |a| &a.place), what);
+        }
+        match config.query.mismatch(&config.store.occlusion) {
+            Some(what) => invalid(place, what.to_owned()),
+            None => Ok(config),
+        }
+    }
+}
+
+/// A configuration under assignment, as a tree of keys too.
+struct Tree {
+    config: Config,
+    tree: Value,
+}
+
+impl Tree {
+    fn new(config: &Config) -> Tree {
+        // Plain records of numbers and enums: nothing in them can fail to serialise.
+        Tree { config: config.clone(), tree: serde_json::to_value(config).unwrap_or_default() }
+    }
+
+    fn at(&self, path: &str) -> Option<&Value> {
+        at(&self.tree, path)
+    }
+
+    /// Takes an assignment apart until it names a single key, and sets it.
+    fn apply(&mut self, assignment: &Assignment, waiting: &mut Vec<Assignment>) -> Result<(), ConfigError> {
+        let Assignment { place, path, value } = assignment;
+        let part = |(path, value)| Assignment { place: place.clone(), path, value };
+        if let Some(parts) = aliases::today(path, value) {
+            for part in parts.into_iter().map(part) {
+                let is_waiting = self.at(&part.path).is_none();
+                if is_waiting {
+                    waiting.push(part);
+                } else {
+                    self.apply(&part, waiting)?;
+                }
+            }
+            return Ok(());
+        }
+        let has_keys = self.at(path).is_some_and(Value::is_object) || aliases::is_old_section(path);
+        if has_keys && let Some(parts) = below(path, value) {
+            return parts.into_iter().try_for_each(|p| self.apply(&part(p), waiting));
+        }
+        // The settings of a choice that is taken already: those that are not named stay.
+        if let Some((name, settings)) = choice(value) {
+            let taken = format!("{path}.{name}");
+            if self.at(&taken).is_some_and(Value::is_object)
+                && let Some(parts) = if settings.is_empty() { None } else { below(&taken, settings) }
+            {
+                return parts.into_iter().try_for_each(|p| self.apply(&part(p), waiting));
+            }
+        }
+        self.set(assignment)
+    }
+
+    fn set(&mut self, Assignment { place, path, value }: &Assignment) -> Result<(), ConfigError> {
+        let error = |what: String| ConfigError::Invalid { place: place.clone(), what };
+        if self.at(path).is_none() && aliases::today(path, value).is_some() {
+            return Ok(());
+        }
+        let alone = alone(path, value);
+        if let Ok(alone) = &alone {
+            // Before JSON makes `null` of NaN and infinities, and so the default of a key that may be left out.
+            alone.check(place)?;
+        }
+        let parsed = alone.as_ref().ok().and_then(|alone| at(&serde_json::to_value(alone).ok()?, path).cloned());
+        set(&mut self.tree, path, parsed.unwrap_or_else(|| plain(value))).map_err(error)?;
+        self.config = serde_json::from_value::<Config>(self.tree.clone())
+            .map_err(|e| error(explain(&e, alone.as_ref().err(), value)))?;
+        self.config.check(place)?;
+        // Choices bring keys of their own.
+        self.tree = serde_json::to_value(&self.config).unwrap_or_default();
+        Ok(())
+    }
+}
+
+/// What is wrong with a value: RON knows it better where it is about names.
+fn explain(error: &serde_json::Error, alone: Option<&SpannedError>, value: &str) -> String {
+    if let Some(message) = messages::without_parameters(value) {
+        return message;
+    }
+    match alone.map(|e| &e.code) {
+        Some(code @ (ron::Error::NoSuchEnumVariant { .. } | ron::Error::NoSuchStructField { .. })) => {
+            messages::of_value(code, value)
+        }
+        _ => error.to_string(),
+    }
+}
+
+fn set(tree: &mut Value, path: &str, value: Value) -> Result<(), String> {
+    let mut node = tree;
+    for key in path.split('.') {
+        let Value::Object(map) = node else {
+            return Err(format!("'{key}' cannot be set: what stands before it has no keys"));
+        };
+        if !map.contains_key(key) {
+            return Err(messages::unknown_key(key, map.keys().map(String::as_str)));
+        }
+        node = &mut map[key];
+    }
+    *node = value;
+    Ok(())
+}
+
+fn at<'v>(tree: &'v Value, path: &str) -> Option<&'v Value> {
+    path.split('.').try_fold(tree, |node, key| node.get(key))
+}
+
+/// A configuration with nothing but this key. A key may be a field, or a choice and then stand before its settings.
+fn alone(path: &str, value: &str) -> Result<Config, SpannedError> {
+    let keys: Vec<&str> = path.split('.').collect();
+    let text = |choices: usize| {
+        keys.iter().enumerate().rev().fold(value.to_owned(), |inner, (i, key)| match choices >> i & 1 {
+            1 => format!("{key}{inner}"),
+            _ => format!("({key}: {inner})"),
+        })
+    };
+    let parse = |choices: usize| super::ron_options().from_str::<Config>(&text(choices));
+    // The first key is a section, and what a choice stands before is in parentheses.
+    let candidates = (1..1usize << keys.len().min(8)).filter(|choices| choices & 1 == 0);
+    let plain = parse(0);
+    match plain {
+        Ok(config) => Ok(config),
+        Err(error) => candidates.filter_map(|choices| parse(choices).ok()).next().ok_or(error),
+    }
+}
+
+/// A number, `true`, JSON, or else the name of a choice.
+fn plain(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|_| Value::String(text.to_owned()))
+}

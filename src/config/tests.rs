@@ -1,0 +1,227 @@
+//! Layers, keys of before, ranges and messages.
+
+use serde_json::Value;
+
+use super::*;
+use crate::probe::query::VisibilityTest;
+use crate::probe::store::OcclusionStore;
+use crate::probe::store::moments::MomentsStore;
+use crate::probe::transport::BounceSettings;
+
+fn with(assignments: &[&str]) -> Result<Config, ConfigError> {
+    Config::default().with_overrides(&assignments.iter().map(|s| s.to_string()).collect::<Vec<_>>())
+}
+
+fn moments(resolution: usize) -> OcclusionStore {
+    OcclusionStore::Moments(MomentsStore { resolution, ..Default::default() })
+}
+
+#[test]
+fn ron_round_trip() {
+    for config in [Config::default(), with(&["query.visibility=moments(power: 3, floor: 0.05)"]).unwrap()] {
+        assert_eq!(Config::parse(&config.to_ron(), "itself").unwrap(), config, "{}", config.to_ron());
+    }
+    let path = presets::find("path").unwrap().config().unwrap();
+    assert_eq!(Config::parse(&path.to_ron(), "itself").unwrap(), path);
+}
+
+#[test]
+fn every_preset_parses_and_default_is_the_default() {
+    for preset in presets::PRESETS {
+        preset.config().unwrap();
+    }
+    assert_eq!(presets::find("default").unwrap().config().unwrap(), Config::default());
+    assert!(Layers::default().preset("defualt").unwrap_err().to_string().contains("default"));
+}
+
+/// A preset says how, a scene's configuration where.
+#[test]
+fn presets_say_nothing_about_a_scene() {
+    for preset in presets::PRESETS.iter().filter(|preset| preset.name != "default") {
+        for assignment in assignments::of_text(preset.text, preset.name).unwrap() {
+            let section = assignment.path.split('.').next().unwrap();
+            assert!(!["grid", "lights", "materials"].contains(&section), "{}: {}", preset.name, assignment.path);
+        }
+    }
+}
+
+#[test]
+fn layers_lie_on_each_other() {
+    let scene = "(grid: (spacing_m: 0.75), transport: paths(paths: 8))";
+    let layers = Layers::default().preset("path").unwrap().text(scene, "scene.ron").unwrap();
+    let config = layers.config().unwrap();
+    // The scene's file says only what stands there: all else of the preset stays.
+    let preset = presets::find("path").unwrap().config().unwrap();
+    assert_eq!(config.grid.spacing_m, Some(0.75));
+    assert_eq!(config.transport, Transport::Paths { paths: 8 });
+    assert_eq!(config.store, preset.store);
+    assert_ne!(config.store, Config::default().store);
+    let set = layers.set(&["transport.paths.paths=2".to_owned()]).unwrap().config().unwrap();
+    assert_eq!(set.transport, Transport::Paths { paths: 2 });
+    // The settings of a choice that are not named stay as the layers below have them.
+    let config = Layers::default().text("(store: (occlusion: moments(resolution: 6)), query: (test: chebyshev(power: 1, floor: 0)))", "a").unwrap();
+    let config = config.text("(store: (occlusion: moments(exponent: 20)))", "b").unwrap().config().unwrap();
+    let expected = MomentsStore { resolution: 6, exponent: 20.0, ..Default::default() };
+    assert_eq!(config.store.occlusion, OcclusionStore::Moments(expected));
+}
+
+#[test]
+fn keys_of_before_mean_what_they_are_called_now() {
+    for (old, new) in [
+        ("capture.resolution=9", &["capture.rays.octahedral.resolution=9"][..]),
+        ("capture.samples_per_texel=3", &["capture.rays=octahedral(per_texel: 3)"]),
+        ("capture.reflected=path_traced(paths: 7)", &["transport=paths(paths: 7)"]),
+        ("capture.reflected=through_probes", &[]),
+        ("encoding.irradiance=f32", &["store.irradiance.octahedral.format=f32"]),
+        ("encoding.curve=gamma5_over_2pi", &["store.irradiance.octahedral.curve=gamma5_over_2pi"]),
+        ("encoding.border=0", &["store.border=0"]),
+        ("filter.irradiance_resolution=6", &["store.irradiance.octahedral.resolution=6"]),
+        ("filter=(irradiance_resolution: 6)", &["store.irradiance.octahedral.resolution=6"]),
+        ("placement.rays=64", &["placement.rule.settle.rays=64"]),
+        ("placement.back_face_share=0.3", &["placement.rule.settle.back_face_share=0.3"]),
+        ("placement.relocate=false", &["placement.rule.settle.relocate=false"]),
+        ("query.visibility=none", &["store.occlusion=none", "query.test=none"]),
+        (
+            "query.visibility=moments(power: 2, floor: 0.1)",
+            &["store.occlusion=moments()", "query.test=chebyshev(power: 2, floor: 0.1)"],
+        ),
+        (
+            "query.visibility={\"moments\":{\"power\":2,\"floor\":0.1}}",
+            &["store.occlusion=moments()", "query.test=chebyshev(power: 2, floor: 0.1)"],
+        ),
+        ("query.visibility=surface(voxels_per_cell: 5)", &["store.occlusion.surface.voxels_per_cell=5"]),
+        ("query.visibility.surface.voxels_per_cell=5", &["store.occlusion.surface.voxels_per_cell=5"]),
+        ("solver.max_bounces=3", &["transport.bounces.max_bounces=3"]),
+        ("solver.max_sweeps=9", &["transport.bounces.max_iterations=9"]),
+        ("solver.acceleration=never", &["transport.bounces.acceleration=never"]),
+        ("solver.tolerance=0.01", &["transport=bounces(tolerance: 0.01)"]),
+        ("solver.albedo_max=0.5", &["materials.albedo_max=0.5"]),
+        ("plan=keep_everything", &["plan.mode=keep_everything"]),
+    ] {
+        assert_eq!(with(&[old]).unwrap(), with(new).unwrap(), "{old}");
+    }
+}
+
+/// The distance maps' keys stood beside the visibility that they belong to, in any order, and also where there was none.
+#[test]
+fn old_keys_of_distance_maps_wait_for_their_choice() {
+    let visibility = "query.visibility=moments(power: 3, floor: 0)";
+    for order in [["filter.distance_resolution=6", visibility], [visibility, "filter.distance_resolution=6"]] {
+        assert_eq!(with(&order).unwrap().store.occlusion, moments(6));
+    }
+    assert_eq!(with(&["filter.distance_resolution=6"]).unwrap(), Config::default());
+    let whole = "(filter: (irradiance_resolution: 6, distance_resolution: 7), query: (visibility: moments(power: 1, \
+                 floor: 0.0), blend: linear), solver: (max_bounces: Some(2)), plan: leave_out)";
+    let config = Config::parse(whole, "old.ron").unwrap();
+    assert_eq!(config.store.occlusion, moments(7));
+    assert_eq!(config.query.test, VisibilityTest::Chebyshev { power: 1.0, floor: 0.0 });
+    let bounces = BounceSettings { max_bounces: Some(2), ..Default::default() };
+    assert_eq!(config.transport, Transport::Bounces(bounces));
+}
+
+#[test]
+fn values_of_every_kind() {
+    let config = with(&[
+        "grid.divisions=(3,4,5)",
+        "transport.bounces.max_bounces=None",
+        "transport.bounces.tolerance=1e-3",
+        "store.occlusion=moments(resolution: 5)",
+        "query.test=chebyshev(power: 3, floor: 0.05)",
+        "query.test.chebyshev.power=2",
+        "plan.keep=[\"visibility\"]",
+    ])
+    .unwrap();
+    assert_eq!(config.grid.divisions, Some((3, 4, 5)));
+    assert_eq!(config.transport, Transport::Bounces(BounceSettings { tolerance: 1e-3, ..Default::default() }));
+    assert_eq!(config.query.test, VisibilityTest::Chebyshev { power: 2.0, floor: 0.05 });
+    assert!(config.plan.keeps("visibility") && !config.plan.keeps("sky"));
+}
+
+#[test]
+fn mistakes_are_named() {
+    for (assignment, expected) in [
+        ("grid.spacing=1", "did you mean 'spacing_m'"),
+        ("grid.spacing_m", "key=value"),
+        ("grid.spacing_m=wide", "wide"),
+        ("encoding.irradiance=f64", "f64"),
+        ("solver.albedo_max=2", "not including 1"),
+        ("grid.spacing_m.x=1", "has no keys"),
+        ("encoding.irradiance=f61", "did you mean 'f16'"),
+        ("query.visibility=surface", "surface(voxels_per_cell: 8)"),
+        ("query.direction=cosine", "cosine(floor: 0.05)"),
+        ("query.test=chebyshev", "chebyshev(power: 3, floor: 0.05)"),
+        ("store.occlusion=surface(voxels: 8)", "did you mean 'voxels_per_cell'"),
+        ("store.occlusion=moments()", "query.test must be chebyshev"),
+        ("query.test=none", "query.test must be table"),
+        ("grid.spacing_m=NaN", "positive"),
+        ("grid=(spacing_m: inf)", "positive"),
+        ("query.visibility=moments(power: 1e39, floor: 0)", "finite"),
+        ("plan.keep=[\"visible\"]", "plan.keep is visible"),
+    ] {
+        let error = with(&[assignment]).map(|c| c.to_ron()).unwrap_err().to_string();
+        assert!(error.contains(expected), "{assignment}: {error}");
+    }
+}
+
+/// NaN and infinities are no numbers of metres, shares or anything else, and no way of writing a default.
+#[test]
+fn no_key_takes_what_is_not_finite() {
+    fn leaves(node: &Value, path: String, out: &mut Vec<String>) {
+        match node {
+            Value::Object(map) => map.iter().for_each(|(key, node)| leaves(node, format!("{path}.{key}"), out)),
+            Value::Number(_) => out.push(path.trim_start_matches('.').to_owned()),
+            _ => {}
+        }
+    }
+    let mut paths = Vec::new();
+    leaves(&serde_json::to_value(Config::default()).unwrap(), String::new(), &mut paths);
+    assert!(paths.len() > 25, "{paths:?}");
+    for odd in ["NaN", "inf", "-inf", "1e400"] {
+        let optional = ["grid.spacing_m=X", "lights.sky=(X,0,0)", "grid.bounds=(min: (0,0,0), max: (1,X,1))"];
+        let assignments = paths.iter().map(|path| format!("{path}=X")).chain(optional.map(String::from));
+        for assignment in assignments.map(|a| a.replace('X', odd)) {
+            assert!(with(&[&assignment]).is_err(), "{assignment}");
+        }
+        let file = format!("(grid: (spacing_m: {odd}))");
+        assert!(Config::parse(&file, "a.ron").unwrap_err().to_string().contains("a.ron"), "{file}");
+    }
+}
+
+#[test]
+fn a_spacing_gives_way_to_divisions_on_request() {
+    let error = with(&["grid.spacing_m=1", "grid.divisions=(2,2,2)"]).unwrap_err().to_string();
+    assert!(error.contains("--set grid.spacing_m=None"), "{error}");
+    let config = with(&["grid.spacing_m=1", "grid.spacing_m=None", "grid.divisions=(2,2,2)"]).unwrap();
+    assert_eq!((config.grid.spacing_m, config.grid.divisions), (None, Some((2, 2, 2))));
+}
+
+#[test]
+fn unknown_keys_name_the_nearest_one_and_the_place() {
+    let error = Config::parse("(grid: (\n  spacing: 1.0))", "a.ron").unwrap_err().to_string();
+    assert!(error.contains("a.ron, line 2") && error.contains("'spacing_m'"), "{error}");
+}
+
+#[test]
+fn out_of_range_values_name_key_and_range() {
+    let error = Config::parse("(capture: (resolution: 0))", "a.ron").unwrap_err().to_string();
+    assert!(error.contains("octahedral.resolution is 0") && error.contains("1 to 1024"), "{error}");
+    assert!(Config::parse("(materials: (albedo_max: 1.0))", "a.ron").is_err());
+}
+
+#[test]
+fn files_that_say_nothing_and_marks_before_them() {
+    assert_eq!(Config::parse("\u{feff}()", "a.ron").unwrap(), Config::default());
+    for (text, words) in [("", "it is empty"), ("\u{feff}\n", "it is empty"), ("// all defaults", "() gives")] {
+        let error = Config::parse(text, "a.ron").unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+    let error = Config::parse("(query: (\n test: chebyshev,\n))", "a.ron").unwrap_err().to_string();
+    assert!(error.contains("chebyshev(power: 3, floor: 0.05)") && error.contains("line 2"), "{error}");
+    let error = Config::parse("(grid: (spacing_m: 1, divisions: (2, 2, 2)))", "a.ron").unwrap_err().to_string();
+    assert!(error.contains("a.ron") && error.contains("remove one"), "{error}");
+}
+
+#[test]
+fn options_need_no_some() {
+    assert_eq!(Config::parse("(grid: (spacing_m: 0.5))", "a.ron").unwrap().grid.spacing_m, Some(0.5));
+}

@@ -1,0 +1,71 @@
+//! The metadata of a probe file.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::probe::container::Container;
+use crate::probe::query::QuerySettings;
+
+/// The metadata key `grid`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GridRecord {
+    pub kind: GridKind,
+    /// Probe (0,0,0), world space, metres.
+    pub origin: [f64; 3],
+    pub spacing: [f32; 3],
+    /// Probes along each axis.
+    pub divisions: [u32; 3],
+    /// Levels of subdivision below the base cells; 0 for uniform grids.
+    pub levels: u32,
+    /// Border texels of the maps.
+    pub border: usize,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GridKind {
+    Uniform,
+}
+
+/// The metadata key `scene`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SceneRecord {
+    pub name: String,
+    pub blake3: String,
+}
+
+/// Version of the metadata key `query` that this program writes. A change of what a look-up does raises it.
+pub const QUERY_VERSION: u32 = 1;
+
+/// The metadata key `query`: all that a look-up and the shading around it need beside the tensors.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct QueryRecord {
+    pub version: u32,
+    pub weights: QuerySettings,
+    /// Whether probes may stand elsewhere than at their grid points, so that shading needs `position`.
+    pub moved: bool,
+    pub light: LightRecord,
+}
+
+/// The light that the probes were baked in, as far as the configuration says it: shading adds what is direct of it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightRecord {
+    /// Factor on punctual lights.
+    pub punctual_scale: f32,
+    /// Constant radiance of the sky, linear RGB, W·m⁻²·sr⁻¹, in place of none.
+    pub sky: Option<(f32, f32, f32)>,
+    /// Albedos are clamped to this.
+    pub albedo_max: f32,
+}
+
+/// The version of a file's `query` where it is newer than this program.
+pub fn newer(container: &Container) -> Result<Option<u64>, String> {
+    if !container.metadata.contains_key("query") {
+        return Ok(None);
+    }
+    let query: Value = container.json("query")?;
+    let version = query["version"].as_u64().ok_or("metadata 'query' has no version")?;
+    Ok((version > u64::from(QUERY_VERSION)).then_some(version))
+}

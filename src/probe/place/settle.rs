@@ -1,0 +1,229 @@
+//! Moving a probe from its grid point to where it sees something.
+
+use glam::Vec3;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::sampled::sampled_probes;
+use super::{Placement, PlacementRule, PlacementTask};
+use crate::light::World;
+use crate::math::fibonacci;
+use crate::probe::lattice::{Grid, ProbeState};
+use crate::trace::Ray;
+
+/// Lengths are in spacings: the smallest of the grid's three.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SettleSettings {
+    /// Rays that decide about one probe.
+    pub rays: u32,
+    /// A probe counts as inside geometry (or outside the world) when more than this share of what its rays meet are
+    /// backs of surfaces, 0 to 1. Beside a sheet that has only a front nearly half of them are.
+    pub back_face_share: f32,
+    /// Move probes that are inside geometry, or touch it, into the open where it is near.
+    pub relocate: bool,
+    /// Farthest that a probe is moved from its grid point. Beyond half a spacing it would be nearer to a neighbour's place
+    /// than to its own; 0.45 is the bound of Majercik et al. 2021.
+    pub max_move: f32,
+    /// Nearer to a surface than this, a probe is moved away from it: the surface would fill 47 % of what it sees of a wall
+    /// one spacing wide.
+    pub min_clearance: f32,
+    /// How far from a surface a moved probe comes to lie: more than `min_clearance`, so that it is not moved again, and
+    /// less than the 0.125 that a voxel of the default table is wide, so that the surface's own voxels see it.
+    pub clearance: f32,
+    /// Moves tried before a probe stays as it was.
+    pub max_moves: u32,
+    /// How far from a surface that sees no probe one is put; half the free space where that is less.
+    pub need_distance: f32,
+    /// Surfaces in need tried for one probe, nearest first.
+    pub need_tries: u32,
+}
+
+impl Default for SettleSettings {
+    fn default() -> Self {
+        SettleSettings {
+            rays: 128,
+            back_face_share: 0.5,
+            relocate: true,
+            max_move: 0.45,
+            min_clearance: 0.05,
+            clearance: 0.12,
+            max_moves: 4,
+            need_distance: 0.2,
+            need_tries: 12,
+        }
+    }
+}
+
+impl SettleSettings {
+    /// Calls `rule(key, value, holds, rule)` for every number in it.
+    pub fn check(&self, rule: &mut dyn FnMut(&'static str, String, bool, &'static str)) {
+        rule("placement.rule.settle.rays", self.rays.to_string(), (1..=65_536).contains(&self.rays), "use 1 to 65536");
+        for (key, value) in [
+            ("placement.rule.settle.back_face_share", self.back_face_share),
+            ("placement.rule.settle.max_move", self.max_move),
+            ("placement.rule.settle.min_clearance", self.min_clearance),
+            ("placement.rule.settle.clearance", self.clearance),
+            ("placement.rule.settle.need_distance", self.need_distance),
+        ] {
+            rule(key, value.to_string(), (0.0..=1.0).contains(&value), "use a number from 0 to 1");
+        }
+        for (key, value) in [
+            ("placement.rule.settle.max_moves", self.max_moves),
+            ("placement.rule.settle.need_tries", self.need_tries),
+        ] {
+            rule(key, value.to_string(), value <= 1024, "use 0 to 1024");
+        }
+    }
+}
+
+/// What the rays around a position meet.
+#[derive(Debug, Clone, Copy)]
+pub struct Surroundings {
+    rays: u64,
+    hits: u64,
+    backs: u64,
+    emitting: u64,
+    /// Distance and direction of the nearest back, and of the nearest front.
+    nearest_back: (f32, Vec3),
+    nearest_front: (f32, Vec3),
+}
+
+impl Default for Surroundings {
+    fn default() -> Self {
+        let nothing = (f32::INFINITY, Vec3::ZERO);
+        Surroundings { rays: 0, hits: 0, backs: 0, emitting: 0, nearest_back: nothing, nearest_front: nothing }
+    }
+}
+
+/// A probe on its way.
+#[derive(Clone, Copy)]
+struct Settled {
+    state: ProbeState,
+    position: Vec3,
+    around: Surroundings,
+    /// Rays of all positions tried.
+    rays: u64,
+    moved: bool,
+}
+
+/// Classifies every probe of the grid that a surface can sample, or that is to be kept anyway, and moves it where the rule
+/// says so.
+pub fn settle_all(world: &World, task: &PlacementTask) -> Placement {
+    let PlacementTask { grid, settings, .. } = *task;
+    let sampled = sampled_probes(grid, &world.scene.mesh, task.reach);
+    let of_probe = |probe: usize| -> Settled {
+        let position = grid.grid_point(crate::probe::ProbeIndex(probe as u32));
+        if !sampled[probe] && !settings.keep_unsampled {
+            let around = Surroundings::default();
+            return Settled { state: ProbeState::NeverSampled, position, around, rays: 0, moved: false };
+        }
+        match &settings.rule {
+            PlacementRule::Settle(rule) => Settler { world, grid, settings: rule }.settle(position),
+            PlacementRule::GridPoints => {
+                let around = Settler { world, grid, settings: &SettleSettings::default() }.look(position);
+                Settled { state: ProbeState::Active, position, around, rays: around.rays, moved: false }
+            }
+        }
+    };
+    let found: Vec<Settled> = (0..grid.probe_count()).into_par_iter().map(of_probe).collect();
+    let active = || found.iter().zip(&sampled).filter(|(f, _)| f.state == ProbeState::Active);
+    // Only of those that matter: keeping the others must not change how samples are divided.
+    let counted = || active().filter(|(_, sampled)| **sampled);
+    let seen: u64 = counted().map(|(f, _)| f.around.rays).sum();
+    let emitting: u64 = counted().map(|(f, _)| f.around.emitting).sum();
+    Placement {
+        relocated: active().filter(|(f, _)| f.moved).count(),
+        emitter_coverage: if seen > 0 { emitting as f32 / seen as f32 } else { 0.0 },
+        rays: found.iter().map(|f| f.rays).sum(),
+        states: found.iter().map(|f| f.state).collect(),
+        positions: found.iter().map(|f| f.position).collect(),
+        sampled,
+        survey: None,
+    }
+}
+
+/// Classifies a probe and, where that helps, moves it.
+pub struct Settler<'a, 's> {
+    pub world: &'a World<'s>,
+    pub grid: &'a Grid,
+    pub settings: &'a SettleSettings,
+}
+
+impl Settler<'_, '_> {
+    /// A length in spacings, metres.
+    pub fn metres(&self, spacings: f32) -> f32 {
+        spacings * self.grid.spacing_min()
+    }
+
+    /// What the rays around a position meet.
+    pub fn look(&self, position: Vec3) -> Surroundings {
+        let count = self.settings.rays as usize;
+        let mut found = Surroundings { rays: count as u64, ..Default::default() };
+        for i in 0..count {
+            let direction = fibonacci::direction(i, count);
+            let Some(surface) = self.world.surface(Ray::new(position, direction, i as u32)) else {
+                found.emitting += u64::from(self.world.emitters.has_sky());
+                continue;
+            };
+            found.hits += 1;
+            found.emitting += u64::from(surface.emission != Vec3::ZERO);
+            let nearest = if surface.is_back() {
+                found.backs += 1;
+                &mut found.nearest_back
+            } else {
+                &mut found.nearest_front
+            };
+            if surface.hit.t < nearest.0 {
+                *nearest = (surface.hit.t, direction);
+            }
+        }
+        found
+    }
+
+    /// Whether so many of them are backs that the position lies inside something.
+    pub fn is_inside(&self, around: &Surroundings) -> bool {
+        around.backs as f32 > self.settings.back_face_share * around.hits as f32
+    }
+
+    /// Where a probe with these surroundings should rather be; `None` where it is well placed.
+    fn better(&self, position: Vec3, around: &Surroundings) -> Option<Vec3> {
+        let clearance = self.metres(self.settings.clearance);
+        if self.is_inside(around) {
+            // Through the nearest back face into the open.
+            let (distance, direction) = around.nearest_back;
+            return Some(position + direction * (distance + clearance));
+        }
+        let (distance, direction) = around.nearest_front;
+        (distance < self.metres(self.settings.min_clearance)).then(|| position - direction * (clearance - distance))
+    }
+
+    /// State of the probe of a grid point, and the position that it settles at.
+    fn settle(&self, grid_point: Vec3) -> Settled {
+        let first = self.look(grid_point);
+        let mut rays = first.rays;
+        let (mut best, mut best_around, mut moved) = (grid_point, first, false);
+        if self.settings.relocate {
+            let (mut position, mut around) = (best, best_around);
+            for _ in 0..self.settings.max_moves {
+                let Some(next) = self.better(position, &around) else { break };
+                // Where nothing is near, the distance to it is infinite.
+                if !next.is_finite() || next.distance(grid_point) > self.metres(self.settings.max_move) {
+                    break;
+                }
+                (position, around) = (next, self.look(next));
+                rays += around.rays;
+                // Into the open from inside, or away from a surface without getting inside another.
+                let nearer = around.nearest_front.0 < best_around.nearest_front.0;
+                if !self.is_inside(&around) && (self.is_inside(&best_around) || !nearer) {
+                    (best, best_around, moved) = (position, around, true);
+                }
+            }
+        }
+        if self.is_inside(&best_around) {
+            let state = ProbeState::InsideGeometry;
+            return Settled { state, position: grid_point, around: best_around, rays, moved };
+        }
+        Settled { state: ProbeState::Active, position: best, around: best_around, rays, moved }
+    }
+}

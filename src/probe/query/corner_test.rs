@@ -1,0 +1,72 @@
+//! The tests that tell which of its eight probes a point sees. Each is a type of its own, so that loops over points are
+//! compiled for each.
+
+use glam::{Vec2, Vec3};
+
+use super::QueryPoint;
+use crate::probe::lattice::grid::{Cell, Grid, ProbeIndex};
+use crate::probe::store::map::OctahedralMaps;
+use crate::probe::store::moments::chebyshev;
+use crate::probe::store::surface::{Seen, SurfaceVisibility, TableTest};
+
+pub trait CornerTest {
+    /// Which corners of its cell a point may see at all.
+    fn seen(&self, grid: &Grid, cell: &Cell, point: &QueryPoint, biased: Vec3) -> Seen;
+
+    /// How far it sees the probe, 0 to 1.
+    fn factor(&self, probe: ProbeIndex, biased: Vec3) -> f32;
+}
+
+/// The corners that are visible are known: bit i for corner i.
+pub struct Mask(pub u8);
+
+impl CornerTest for Mask {
+    #[inline]
+    fn seen(&self, _: &Grid, _: &Cell, _: &QueryPoint, _: Vec3) -> Seen {
+        Seen { mask: self.0, far: None }
+    }
+
+    #[inline]
+    fn factor(&self, _: ProbeIndex, _: Vec3) -> f32 {
+        1.0
+    }
+}
+
+/// Chebyshev's bound from the moments of distance.
+pub struct MomentsTest<'v> {
+    pub maps: &'v OctahedralMaps<Vec2>,
+    pub positions: &'v [Vec3],
+    pub power: f32,
+    pub floor: f32,
+}
+
+impl CornerTest for MomentsTest<'_> {
+    #[inline]
+    fn seen(&self, _: &Grid, _: &Cell, _: &QueryPoint, _: Vec3) -> Seen {
+        Seen { mask: u8::MAX, far: None }
+    }
+
+    #[inline]
+    fn factor(&self, probe: ProbeIndex, biased: Vec3) -> f32 {
+        let probe = probe.0 as usize;
+        chebyshev(self.maps, probe, biased - self.positions[probe]).powf(self.power).max(self.floor)
+    }
+}
+
+/// The table of visibility measured at the surfaces.
+pub struct SurfaceTest<'v> {
+    pub table: &'v SurfaceVisibility,
+    pub test: TableTest,
+}
+
+impl CornerTest for SurfaceTest<'_> {
+    #[inline]
+    fn seen(&self, grid: &Grid, cell: &Cell, point: &QueryPoint, biased: Vec3) -> Seen {
+        self.table.look_up(grid, cell, biased, point.facing, &self.test)
+    }
+
+    #[inline]
+    fn factor(&self, _: ProbeIndex, _: Vec3) -> f32 {
+        1.0
+    }
+}

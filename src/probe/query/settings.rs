@@ -1,0 +1,177 @@
+//! What a method says about asking its probes.
+
+use glam::Vec3A;
+use serde::{Deserialize, Serialize};
+
+use crate::probe::store::OcclusionStore;
+use crate::probe::store::surface::TableTest;
+
+/// A method's weights: the factors multiply in the order of these fields.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct QuerySettings {
+    pub direction: DirectionWeight,
+    pub test: VisibilityTest,
+    /// Smallest trilinear weight along each axis.
+    pub trilinear_floor: f32,
+    /// Smallest weight before `crush_below` and the trilinear factor.
+    pub weight_floor: f32,
+    /// Weights w below this threshold t become w³/t², which silences probes that hardly count; 0 turns it off.
+    pub crush_below: f32,
+    pub blend: Blend,
+    /// Shift of the looked-up point along its normal, in spacings.
+    pub normal_bias: f32,
+    /// Shift of the looked-up point towards the viewer, in spacings.
+    pub view_bias: f32,
+    /// Whether the shifted point also chooses the cell and the trilinear weights; else only the visibility test sees the
+    /// shift.
+    pub biased_cell: bool,
+}
+
+impl Default for QuerySettings {
+    fn default() -> Self {
+        QuerySettings {
+            direction: DirectionWeight::Uniform,
+            test: VisibilityTest::default(),
+            trilinear_floor: 0.0,
+            weight_floor: 0.0,
+            crush_below: 0.0,
+            blend: Blend::Linear,
+            normal_bias: 0.0,
+            view_bias: 0.0,
+            biased_cell: true,
+        }
+    }
+}
+
+/// Weight by the cosine c between the normal and the direction from the point to the probe.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum DirectionWeight {
+    /// 1.
+    Uniform,
+    /// max(floor, c).
+    Cosine { floor: f32 },
+    /// ((c + 1)/2)² + offset.
+    Wrap { offset: f32 },
+}
+
+/// How a look-up decides which probes a point sees.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum VisibilityTest {
+    /// Every probe counts as visible.
+    None,
+    /// Chebyshev's bound from the stored moments of distance, to a power, not below a floor.
+    Chebyshev { power: f32, floor: f32 },
+    /// The table of visibility at surfaces.
+    Table(TableTest),
+}
+
+impl Default for VisibilityTest {
+    fn default() -> Self {
+        VisibilityTest::Table(TableTest::default())
+    }
+}
+
+/// How the eight irradiances are combined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Blend {
+    Linear,
+    /// Means of square roots, squared (Majercik et al. 2019).
+    SquareRoot,
+}
+
+impl QuerySettings {
+    /// How far from its surface a point may be looked up, in spacings.
+    pub fn reach(&self) -> f32 {
+        self.normal_bias.abs() + self.view_bias.abs()
+    }
+
+    /// Whether weights depend on the point's shading normal.
+    pub fn needs_normal(&self) -> bool {
+        self.direction != DirectionWeight::Uniform || self.normal_bias != 0.0
+    }
+
+    /// Whether weights depend on the direction to the viewer.
+    pub fn needs_view(&self) -> bool {
+        self.view_bias != 0.0
+    }
+
+    /// Whether a look-up is a linear function of the probes' irradiance.
+    pub fn is_linear(&self) -> bool {
+        self.blend == Blend::Linear
+    }
+
+    /// Why this test cannot be asked of that store, with the remedy; `None` where it can.
+    pub fn mismatch(&self, store: &OcclusionStore) -> Option<&'static str> {
+        match (store, &self.test) {
+            (OcclusionStore::None, VisibilityTest::None)
+            | (OcclusionStore::Moments(_), VisibilityTest::Chebyshev { .. })
+            | (OcclusionStore::Surface(_), VisibilityTest::Table(_)) => None,
+            (OcclusionStore::None, _) => Some("store.occlusion is none: query.test must be none too"),
+            (OcclusionStore::Moments(_), _) => {
+                Some("store.occlusion is moments: query.test must be chebyshev(power: p, floor: f)")
+            }
+            (OcclusionStore::Surface(_), _) => Some("store.occlusion is surface: query.test must be table()"),
+        }
+    }
+
+    /// Calls `rule(key, value, holds, rule)` for every number in it.
+    pub fn check(&self, rule: &mut dyn FnMut(&'static str, String, bool, &'static str)) {
+        const UNIT: &str = "use a number from 0 to 1";
+        let mut unit = |key: &'static str, x: f32| rule(key, x.to_string(), (0.0..=1.0).contains(&x), UNIT);
+        unit("query.trilinear_floor", self.trilinear_floor);
+        unit("query.weight_floor", self.weight_floor);
+        unit("query.crush_below", self.crush_below);
+        unit("query.normal_bias", self.normal_bias);
+        unit("query.view_bias", self.view_bias);
+        match self.direction {
+            DirectionWeight::Uniform => {}
+            DirectionWeight::Cosine { floor } => unit("query.direction.cosine.floor", floor),
+            DirectionWeight::Wrap { offset } => unit("query.direction.wrap.offset", offset),
+        }
+        match self.test {
+            VisibilityTest::None => {}
+            VisibilityTest::Chebyshev { power, floor } => {
+                unit("query.test.chebyshev.floor", floor);
+                let holds = power.is_finite() && power >= 0.0;
+                rule("query.test.chebyshev.power", power.to_string(), holds, "use a finite number, not negative");
+            }
+            VisibilityTest::Table(TableTest { reach_voxels, strip }) => {
+                unit("query.test.table.strip", strip);
+                rule("query.test.table.reach_voxels", reach_voxels.to_string(), reach_voxels <= 22, "use 0 to 22");
+            }
+        }
+    }
+}
+
+impl DirectionWeight {
+    #[inline]
+    pub(super) fn at(self, cosine: impl FnOnce() -> f32) -> f32 {
+        match self {
+            DirectionWeight::Uniform => 1.0,
+            DirectionWeight::Cosine { floor } => cosine().max(floor),
+            DirectionWeight::Wrap { offset } => (0.5 * (cosine() + 1.0)).powi(2) + offset,
+        }
+    }
+}
+
+impl Blend {
+    #[inline]
+    pub(super) fn forward(self, irradiance: Vec3A) -> Vec3A {
+        match self {
+            Blend::Linear => irradiance,
+            Blend::SquareRoot => irradiance.max(Vec3A::ZERO).map(f32::sqrt),
+        }
+    }
+
+    #[inline]
+    pub(super) fn backward(self, sum: Vec3A) -> Vec3A {
+        match self {
+            Blend::Linear => sum,
+            Blend::SquareRoot => sum * sum,
+        }
+    }
+}

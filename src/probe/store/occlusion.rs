@@ -1,0 +1,248 @@
+//! What probes know about occlusion: the settings, and the data that a look-up asks.
+
+use std::borrow::Cow;
+
+use glam::Vec2;
+use serde::{Deserialize, Serialize};
+
+use super::kernel::{Directions, Kernel};
+use super::map::OctahedralMaps;
+use super::moments::{self, MomentsBuilder, MomentsStore};
+use super::surface::{self, MAX_VOXELS_PER_CELL, SurfaceStore, SurfaceVisibility};
+use crate::math::statistics::Moments;
+use crate::probe::container::{Container, EncodingLosses};
+use crate::probe::lattice::Grid;
+
+/// How probes know which points they see.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OcclusionStore {
+    /// They do not: every probe counts as visible.
+    None,
+    /// By maps of the distances around every probe, see [`super::moments`].
+    Moments(MomentsStore),
+    /// By visibility measured at the surfaces themselves, see [`super::surface`].
+    Surface(SurfaceStore),
+}
+
+impl Default for OcclusionStore {
+    fn default() -> Self {
+        OcclusionStore::Surface(SurfaceStore::default())
+    }
+}
+
+/// Voxels per cell at which the surfaces are surveyed only to learn whether anything is hidden at all. Half the default of
+/// the table that shading asks: what is hidden in a quarter of a cell is found.
+const SURVEY_VOXELS: u32 = 4;
+
+/// Bytes of a distance texel in memory: two floats, and on the way into the file two codes, twice.
+const DISTANCE_TEXEL_BYTES: u64 = 8 + 8;
+/// Moments of distance of a captured texel, until they are filtered: three f64.
+const MOMENTS_BYTES: u64 = 24;
+
+impl OcclusionStore {
+    /// Voxels per cell at which surfaces are surveyed; `None` where nothing needs to be known about them.
+    pub fn survey_voxels(&self) -> Option<u32> {
+        match self {
+            OcclusionStore::None => None,
+            OcclusionStore::Moments(_) => Some(SURVEY_VOXELS),
+            OcclusionStore::Surface(store) => Some(store.voxels_per_cell),
+        }
+    }
+
+    /// Whether a look-up asks the very table that the survey fills.
+    pub fn keeps_survey(&self) -> bool {
+        matches!(self, OcclusionStore::Surface(_))
+    }
+
+    pub fn is_none(&self) -> bool {
+        *self == OcclusionStore::None
+    }
+
+    /// The longest distance that probes tell from longer ones, in cell diagonals; `None` where they store no distances.
+    pub fn distance_clamp(&self) -> Option<f32> {
+        match self {
+            OcclusionStore::Moments(store) => Some(store.clamp),
+            OcclusionStore::None | OcclusionStore::Surface(_) => None,
+        }
+    }
+
+    /// What collects occlusion while probes are captured and surfaces surveyed.
+    pub fn builder(
+        &self,
+        survey: Option<&SurfaceVisibility>,
+        captured: &Directions,
+        probes: usize,
+        border: usize,
+    ) -> OcclusionBuilder {
+        OcclusionBuilder(match self {
+            OcclusionStore::None => Under::Done(Occlusion::None),
+            OcclusionStore::Moments(store) => Under::Moments(MomentsBuilder::new(store, captured, probes, border)),
+            OcclusionStore::Surface(_) => {
+                Under::Done(survey.map_or(Occlusion::None, |table| Occlusion::Surface(table.clone())))
+            }
+        })
+    }
+
+    /// Bytes of one probe in the layout that shading uses; `survey` is what surveying the surfaces found.
+    pub fn runtime_bytes(&self, border: usize, survey: Option<&SurfaceVisibility>, probes: usize) -> f64 {
+        match self {
+            OcclusionStore::None => 0.0,
+            OcclusionStore::Moments(store) => store.runtime_bytes(border) as f64,
+            OcclusionStore::Surface(_) => survey.map_or(0, SurfaceVisibility::bytes) as f64 / probes as f64,
+        }
+    }
+
+    /// Most memory that one probe takes while it is baked and encoded.
+    pub fn working_bytes(&self, border: usize) -> u64 {
+        match self {
+            OcclusionStore::Moments(store) => {
+                ((store.resolution + 2 * border) as u64).pow(2) * DISTANCE_TEXEL_BYTES
+            }
+            OcclusionStore::None | OcclusionStore::Surface(_) => 0,
+        }
+    }
+
+    /// Memory of the filter from captures of this many texels, and of one capture's distances.
+    pub fn filter_bytes(&self, captured_texels: usize) -> (u64, u64) {
+        match self {
+            OcclusionStore::Moments(store) => (
+                Kernel::bytes(captured_texels, store.resolution.pow(2), store.exponent),
+                captured_texels as u64 * MOMENTS_BYTES,
+            ),
+            OcclusionStore::None | OcclusionStore::Surface(_) => (0, 0),
+        }
+    }
+
+    /// The key that makes it larger, with whether it is larger than its default; `None` where nothing grows with it.
+    pub fn size_key(&self) -> Option<(&'static str, bool)> {
+        match self {
+            OcclusionStore::Moments(store) => Some((
+                "store.occlusion.moments.resolution",
+                store.resolution > MomentsStore::default().resolution,
+            )),
+            OcclusionStore::None | OcclusionStore::Surface(_) => None,
+        }
+    }
+
+    /// Calls `rule(key, value, holds, rule)` for every number in it.
+    pub fn check(&self, most_texels: usize, rule: &mut dyn FnMut(&'static str, String, bool, &'static str)) {
+        match self {
+            OcclusionStore::None => {}
+            OcclusionStore::Moments(MomentsStore { resolution: n, exponent, clamp }) => {
+                let key = "store.occlusion.moments.resolution";
+                rule(key, n.to_string(), (1..=most_texels).contains(n), "use 1 to 1024 texels");
+                let holds = (1.0..=1e4).contains(exponent);
+                rule("store.occlusion.moments.exponent", exponent.to_string(), holds, "use 1 to 10000");
+                let holds = (1.0..=1e3).contains(clamp);
+                rule("store.occlusion.moments.clamp", clamp.to_string(), holds, "use 1 to 1000 cell diagonals");
+            }
+            OcclusionStore::Surface(SurfaceStore { voxels_per_cell: n }) => {
+                let holds = (1..=MAX_VOXELS_PER_CELL).contains(n);
+                rule("store.occlusion.surface.voxels_per_cell", n.to_string(), holds, "use 1 to 22");
+            }
+        }
+    }
+}
+
+/// What a look-up asks about occlusion.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum Occlusion {
+    /// Nothing is hidden, or the method does not know.
+    #[default]
+    None,
+    /// Mean and standard deviation of distance, metres.
+    Moments(OctahedralMaps<Vec2>),
+    Surface(SurfaceVisibility),
+}
+
+/// Occlusion while it is collected.
+pub struct OcclusionBuilder(Under);
+
+enum Under {
+    Done(Occlusion),
+    Moments(MomentsBuilder),
+}
+
+impl OcclusionBuilder {
+    /// What of a captured probe's distances is kept; may run in parallel. Inverse in order: [`Self::set`].
+    pub fn filter(&self, captured: &[Moments]) -> Vec<Vec2> {
+        match &self.0 {
+            Under::Moments(builder) => builder.filter(captured),
+            Under::Done(_) => Vec::new(),
+        }
+    }
+
+    /// Keeps what [`Self::filter`] gave for a probe.
+    pub fn set(&mut self, probe: usize, filtered: &[Vec2]) {
+        if let Under::Moments(builder) = &mut self.0 {
+            builder.set(probe, filtered);
+        }
+    }
+
+    pub fn finish(self) -> Occlusion {
+        match self.0 {
+            Under::Done(occlusion) => occlusion,
+            Under::Moments(builder) => Occlusion::Moments(builder.finish()),
+        }
+    }
+}
+
+impl Occlusion {
+    /// Bytes per probe in the layout that shading uses.
+    pub fn runtime_bytes(&self, probes: usize) -> f64 {
+        match self {
+            Occlusion::None => 0.0,
+            Occlusion::Moments(maps) => {
+                let store = MomentsStore { resolution: maps.resolution, ..MomentsStore::default() };
+                store.runtime_bytes(maps.border) as f64
+            }
+            Occlusion::Surface(table) => table.bytes() as f64 / probes as f64,
+        }
+    }
+
+    /// Writes its tensors; those that are there tell which variant it is.
+    pub fn write(&self, container: &mut Container, losses: &mut EncodingLosses) {
+        match self {
+            Occlusion::None => {}
+            Occlusion::Moments(maps) => moments::write(maps, container, losses),
+            Occlusion::Surface(table) => surface::write(table, container),
+        }
+    }
+
+    /// Reads its tensors; inverse of [`Self::write`] up to rounding.
+    ///
+    /// # Errors
+    /// What is missing or out of range.
+    pub fn read(container: &Container, grid: &Grid, border: usize) -> Result<Occlusion, String> {
+        Ok(if moments::is_in(container) {
+            Occlusion::Moments(moments::read(container, grid.probe_count(), border)?)
+        } else if surface::is_in(container) {
+            Occlusion::Surface(surface::read(container, grid)?)
+        } else {
+            Occlusion::None
+        })
+    }
+
+    /// Root mean square difference of two probes' mean distances, metres; `None` where these are not stored alike.
+    pub fn distance_difference(&self, probe: usize, other: &Occlusion, other_probe: usize) -> Option<f64> {
+        let (Occlusion::Moments(a), Occlusion::Moments(b)) = (self, other) else { return None };
+        if (a.resolution, a.border) != (b.resolution, b.border) {
+            return None;
+        }
+        let (a, b) = (a.probe(probe), b.probe(other_probe));
+        let squares: f64 = a.iter().zip(b).map(|(a, b)| f64::from(a.x - b.x).powi(2)).sum();
+        Some((squares / a.len() as f64).sqrt())
+    }
+
+    /// Name and size in words.
+    pub fn describe(&self) -> Cow<'static, str> {
+        match self {
+            Occlusion::None => "none".into(),
+            Occlusion::Moments(maps) => format!("distance maps of {0}×{0} texels", maps.resolution).into(),
+            Occlusion::Surface(table) => {
+                format!("{} voxels a cell along each axis, {} entries", table.voxels_per_cell, table.keys.len()).into()
+            }
+        }
+    }
+}

@@ -80,10 +80,10 @@ pub struct TraceArgs {
 /// Flags that choose a configuration.
 #[derive(Debug, Args)]
 pub struct ConfigArgs {
-    /// Configuration file.
-    #[arg(long, value_name = "FILE.ron", conflicts_with = "preset")]
+    /// Configuration file; only the keys that stand in it count.
+    #[arg(long, value_name = "FILE.ron")]
     pub config: Option<PathBuf>,
-    /// Built-in configuration; `list` prints their names.
+    /// Built-in configuration that all else lies over; `list` prints their names.
     #[arg(long, value_name = "NAME|list")]
     pub preset: Option<String>,
     /// Override one key of the configuration, for example grid.spacing_m=0.5; may be repeated.
@@ -164,6 +164,12 @@ pub struct RenderArgs {
     /// The same with a reference that is there: of this camera and size, as `reference` or --reference wrote it.
     #[arg(long, value_name = "FILE.exr")]
     pub reference_image: Option<PathBuf>,
+    /// Also light the probes themselves by full paths, and report how far the file's are from that.
+    ///
+    /// Takes longer than all else. With --reference the paths are in proportion to its samples per pixel, and the pictures
+    /// gain an entry with the path-traced probes: what it still errs is interpolation.
+    #[arg(long)]
+    pub bake_error: bool,
     /// Render although the scene has changed since the bake.
     #[arg(long)]
     pub allow_scene_change: bool,
@@ -204,7 +210,7 @@ pub struct ReferenceArgs {
     /// Also write the report to this file.
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,
-    /// Of the configuration `lights` and `solver.albedo_max` count.
+    /// Of the configuration only `lights` and `materials` count.
     #[command(flatten)]
     pub config: ConfigArgs,
 }
@@ -233,7 +239,7 @@ pub struct SweepArgs {
     /// base in the ladder is given.
     #[arg(long, value_name = "NAME|all")]
     pub preset: Vec<String>,
-    /// Configuration file to compare, may be repeated.
+    /// Configuration file to compare, may be repeated. With --preset it lies over each of them, as a scene's own does.
     #[arg(long, value_name = "FILE.ron")]
     pub config: Vec<PathBuf>,
     /// Ladders: which keys of the configurations take which values.
@@ -242,7 +248,7 @@ pub struct SweepArgs {
     /// Override one key of all configurations; may be repeated. The values of a ladder go before it.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// Compare at equal probe positions (all methods take grid and placement of the first) or at equal bytes.
+    /// Compare on equal grids (all methods take bounds and spacing of the first) or at equal bytes.
     #[arg(long, value_enum)]
     pub equal: Option<EqualName>,
     /// Samples per pixel of the reference, rounded up to a multiple of 16. More are added to one that is there.

@@ -5,24 +5,20 @@ use std::time::Instant;
 
 use glam::Vec3;
 
-use crate::config::Config;
 use crate::image::LayeredImage;
 use crate::light::World;
 use crate::math::color::luminance;
 use crate::probe::Volume;
-use crate::probe::file::ProbeFile;
-use crate::probe::query::{Query, VisibilitySettings};
-use crate::probe::store::layout;
+use crate::probe::capture::CaptureSettings;
+use crate::probe::query::Query;
 use crate::probe::transport::truth::Truth;
 use crate::report::baked::{self, BakedReport};
 use crate::report::reference_layers::ReferenceLayers;
 use crate::report::render::{MethodReport, Spread};
 use crate::report::{error, leak};
-use crate::scene::Scene;
 use crate::shade::layers::compose;
 use crate::shade::methods::{Method, exact_masks, irradiance, time_lookup, time_shading};
 use crate::shade::points::View;
-use crate::shade::reference::ReferenceSettings;
 use crate::shade::regions::Region;
 use crate::system::progress::Progress;
 
@@ -156,45 +152,27 @@ pub struct BakedTruth {
 }
 
 impl BakedTruth {
-    /// Hits are many, and each path that leaves one is a sample of its own: few from each do.
-    const REFERENCE_SPP_PER_PATH: u32 = 128;
+    /// Paths from every hit, in proportion to the samples per pixel of a reference: hits are many, and each path that leaves
+    /// one is a sample of its own, so that few from each do.
+    pub fn paths_for(reference_spp: u32) -> u32 {
+        const REFERENCE_SPP_PER_PATH: u32 = 128;
+        (reference_spp / REFERENCE_SPP_PER_PATH).max(1)
+    }
 
-    /// In proportion to the samples of a traced reference.
+    /// Lights the probes by `paths` paths from every hit, in each of the truth's runs.
     pub fn trace(
         world: &World,
-        config: &Config,
+        capture: &CaptureSettings,
         volume: &Volume,
-        settings: &ReferenceSettings,
+        paths: u32,
+        seed: u64,
         progress: Progress,
     ) -> Self {
         let started = Instant::now();
-        let paths = (settings.spp / Self::REFERENCE_SPP_PER_PATH).max(1);
-        let truth = Truth::trace(world, &config.capture, volume, paths, settings.seed, progress);
+        let truth = Truth::trace(world, capture, volume, paths, seed, progress);
         let (figures, standard_error) = baked::measure(volume, &truth);
         let paths_per_hit = u64::from(paths) * truth.runs.len() as u64;
         let report = BakedReport { figures, standard_error, paths_per_hit, time_s: started.elapsed().as_secs_f64() };
         BakedTruth { truth, report }
     }
-}
-
-/// The volume without what the plan found unnecessary, should the file hold it all the same.
-pub fn volume_as_planned(probes: &ProbeFile, scene: &Scene) -> Volume {
-    let mut volume = probes.volume(scene.origin_world);
-    if probes.plan["visibility"] == serde_json::Value::Bool(false) {
-        volume.distance = None;
-        volume.surface_visibility = None;
-    }
-    volume
-}
-
-/// Bytes per probe of what the file holds, in the layout that shading uses.
-pub fn runtime_bytes(probes: &ProbeFile, config: &Config) -> f64 {
-    let count = probes.volume_in_grid().states.len();
-    let surface = probes.volume_in_grid().surface_visibility.as_ref().map_or(0, |s| s.bytes());
-    let visibility = match config.query.visibility {
-        _ if probes.plan["visibility"] == serde_json::Value::Bool(false) => VisibilitySettings::None,
-        visibility => visibility,
-    };
-    layout::irradiance_bytes(&config.filter, &config.encoding, config.placement.relocate) as f64
-        + layout::visibility_bytes(visibility, &config.filter, &config.encoding, surface, count)
 }

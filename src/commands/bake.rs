@@ -6,23 +6,20 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use glam::DVec3;
 
-use super::{
-    Console, check_apart_from, inputs, load_scene, peak_memory_bytes, resolve_config, set_threads, tell, write_json,
-};
+use super::session::{Opening, Session, resolve_config};
+use super::{Console, tell, write_json};
 use crate::bake::{Baked, Checkpoint, Circumstances, Prepared, prepare};
 use crate::cli::BakeArgs;
-use crate::config::{Config, presets};
-use crate::light::World;
+use crate::config::{Config, PlanMode, presets};
 use crate::plan::Line;
-use crate::probe::file::SceneRecord;
-use crate::probe::store::layout;
+use crate::probe::lattice::ProbeState;
 use crate::probe::transport::checkpoint;
 use crate::report::bake::{BakeReport, BytesPerProbe, SCHEMA, SolverReport};
-use crate::report::header::Header;
 use crate::report::table::{Column, Table};
 use crate::scene::Scene;
 use crate::system::format;
-use crate::system::output::{Named, check_outputs};
+use crate::system::memory::peak_memory_bytes;
+use crate::system::output::Named;
 
 pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     if args.config.preset.as_deref() == Some("list") {
@@ -32,41 +29,11 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     if args.print_config {
         return console.print(&config.to_ron());
     }
-    let path = args.scene.as_deref().context("no scene: give a .glb or .gltf file")?;
-    let outputs = outputs(args)?;
-    let config_file = args.config.config.as_ref().map(|file| Named::new("the configuration", file));
-    check_outputs(&outputs, &inputs(path, &args.trace, config_file))?;
-    let threads = set_threads(args.trace.threads)?;
-
-    let started = Instant::now();
     tell::configuration(console, &args.config);
-    let scene = load_scene(path, &args.trace, &config, console)?;
-    check_apart_from(&scene, &outputs)?;
-    let load_s = started.elapsed().as_secs_f64();
-    tell::scene(console, path, &scene, load_s);
-    let accel_started = Instant::now();
-    let world = World::new(&scene, config.lights.punctual_scale, config.solver.albedo_max)?;
-    let accel_build_s = accel_started.elapsed().as_secs_f64();
-    tell::accel(console, accel_build_s);
-
-    let circumstances = Circumstances {
-        seed: args.trace.seed,
-        memory_budget_bytes: args.memory_budget,
-        progress: console.progress,
-        checkpoint: args.output.as_ref().map(|output| Checkpoint {
-            path: checkpoint::path_for(output),
-            resume: args.resume,
-            interval: Checkpoint::INTERVAL,
-        }),
-    };
-    if let Some(Checkpoint { path, resume: true, .. }) = &circumstances.checkpoint {
-        if path.exists() {
-            checkpoint::check(path, &checkpoint::identity(&scene.blake3, args.trace.seed, &config.to_ron()))?;
-        } else {
-            console.warn(format!("--resume: there is no {}; starting anew", path.display()));
-        }
-    }
-    warn_about_bounds(&config, &scene, console);
+    let session = Session::open(opening(args, &config)?, console)?;
+    let (world, accel_build_s) = session.world()?;
+    let circumstances = circumstances(args, &config, &session)?;
+    warn_about_bounds(&config, &session.scene, console);
     let prepared = prepare(&world, &config, &circumstances)?;
     tell::prepared(console, &prepared);
     if args.dry_run {
@@ -75,8 +42,7 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     let raw_started = Instant::now();
     let raw = args.measure_raw.then(|| prepared.raw_rays_per_s(&circumstances)).flatten();
     let raw_s = raw_started.elapsed().as_secs_f64();
-    let record = SceneRecord { name: scene.name.clone(), blake3: scene.blake3.clone() };
-    let mut baked = prepared.bake(&circumstances, &record)?;
+    let mut baked = prepared.bake(&circumstances, &session.scene_record())?;
     tell::baked(console, &baked);
 
     let Some(output) = &args.output else { return Ok(()) };
@@ -84,22 +50,53 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     let file_bytes = baked.container.write(output)?;
     checkpoint::remove(&checkpoint::path_for(output));
     baked.times.write = write_started.elapsed().as_secs_f64();
-    baked.times.load = load_s;
-    baked.times.accel_build = accel_build_s;
+    (baked.times.load, baked.times.accel_build) = (session.load_s, accel_build_s);
     // The measurement is no part of the bake.
-    baked.times.total = started.elapsed().as_secs_f64() - raw_s;
+    baked.times.total = session.elapsed_s() - raw_s;
 
-    let report = report(&baked, &config, &scene, args.trace.seed, threads, file_bytes, raw);
-    warn_about(&report, console);
+    let report = report(&baked, &config, &session, file_bytes, raw);
+    warn_about(&report, &config, console);
     tell::written(console, output);
     if let Some(path) = &args.report {
         write_json(path, &report)?;
         tell::written(console, path);
     }
-    if console.json {
-        return console.print(&serde_json::to_string_pretty(&report)?);
+    session.print(&report, || summary(&report, output))
+}
+
+fn opening<'a>(args: &'a BakeArgs, config: &Config) -> Result<Opening<'a>> {
+    let config_file = args.config.config.as_ref().map(|file| Named::new("the configuration", file));
+    Ok(Opening {
+        scene: args.scene.as_deref().context("no scene: give a .glb or .gltf file")?,
+        trace: &args.trace,
+        light: config.light(),
+        keep_images: config.plan.mode == PlanMode::KeepEverything,
+        inputs: config_file.into_iter().collect(),
+        outputs: outputs(args)?,
+    })
+}
+
+/// Memory, progress and checkpoints of the bake. A checkpoint that cannot be resumed from is refused before captures are
+/// traced again.
+fn circumstances(args: &BakeArgs, config: &Config, session: &Session) -> Result<Circumstances> {
+    let checkpoint = args.output.as_ref().map(|output| Checkpoint {
+        path: checkpoint::path_for(output),
+        resume: args.resume,
+        interval: Checkpoint::INTERVAL,
+    });
+    if let Some(Checkpoint { path, resume: true, .. }) = &checkpoint {
+        if path.exists() {
+            checkpoint::check(path, &checkpoint::identity(&session.scene.blake3, session.seed, &config.to_ron()))?;
+        } else {
+            session.console.warn(format!("--resume: there is no {}; starting anew", path.display()));
+        }
     }
-    console.print(&summary(&report, output))
+    Ok(Circumstances {
+        seed: session.seed,
+        memory_budget_bytes: args.memory_budget,
+        progress: session.console.progress,
+        checkpoint,
+    })
 }
 
 /// What will be written; nothing in a dry run.
@@ -132,7 +129,7 @@ fn warn_about_bounds(config: &Config, scene: &Scene, console: &Console) {
 
 fn dry_run(prepared: &Prepared, circumstances: &Circumstances, console: &Console) -> Result<()> {
     let p = prepared.predict(circumstances);
-    let active = prepared.placement.states.iter().filter(|s| **s as u8 == 0).count();
+    let active = prepared.placement.count(ProbeState::Active);
     if console.json {
         let report = serde_json::json!({
             "schema": "lightprobe-plan/1",
@@ -183,27 +180,13 @@ fn plan_table(lines: &[Line]) -> String {
     table.to_string()
 }
 
-fn report(
-    baked: &Baked,
-    config: &Config,
-    scene: &Scene,
-    seed: u64,
-    threads: usize,
-    file_bytes: u64,
-    raw: Option<f64>,
-) -> BakeReport {
+fn report(baked: &Baked, config: &Config, session: &Session, file_bytes: u64, raw: Option<f64>) -> BakeReport {
     let probes = baked.volume.states.len();
     let traced = (baked.rays.primary + baked.rays.shadow) as f64;
-    let irradiance = layout::irradiance_bytes(&config.filter, &config.encoding, config.placement.relocate) as f64;
-    let visibility = layout::visibility_bytes(
-        config.query.visibility,
-        &config.filter,
-        &config.encoding,
-        baked.surface_bytes,
-        probes,
-    );
+    let (runtime, runtime_kept) = baked.runtime_bytes;
+    let tensors = baked.container.tensors.iter();
     BakeReport {
-        header: Header::new(SCHEMA, "bake", seed, threads, &scene.blake3, config.to_ron()),
+        header: session.header(SCHEMA, "bake", config.to_ron()),
         probes,
         probes_active: baked.volume.active_count(),
         rays: baked.rays,
@@ -212,15 +195,10 @@ fn report(
         raw_embree_rays_per_s: raw,
         peak_memory_bytes: peak_memory_bytes(),
         bytes_per_probe: BytesPerProbe {
-            runtime: irradiance + visibility,
-            runtime_kept: irradiance + if baked.plan.visibility { visibility } else { 0.0 },
+            runtime,
+            runtime_kept,
             file: file_bytes as f64 / probes as f64,
-            tensors: baked
-                .container
-                .tensors
-                .iter()
-                .map(|(n, t)| (n.clone(), t.bytes.len() as f64 / probes as f64))
-                .collect(),
+            tensors: tensors.map(|(n, t)| (n.clone(), t.bytes.len() as f64 / probes as f64)).collect(),
         },
         bounces: baked.solution.bounces.clone(),
         converged: baked.solution.converged,
@@ -231,7 +209,7 @@ fn report(
     }
 }
 
-fn warn_about(report: &BakeReport, console: &Console) {
+fn warn_about(report: &BakeReport, config: &Config, console: &Console) {
     let numerics = &report.numerics;
     if report.probes_active == 0 {
         console
@@ -248,15 +226,17 @@ fn warn_about(report: &BakeReport, console: &Console) {
     }
     if numerics.albedo_clamped > 0 {
         console.say(format!(
-            "{} material(s) reach an albedo above solver.albedo_max and are clamped to it",
+            "{} material(s) reach an albedo above materials.albedo_max and are clamped to it",
             numerics.albedo_clamped
         ));
     }
     for (tensor, &count) in numerics.underflowed.iter().filter(|c| *c.1 > 0) {
         console.say(format!("{count} value(s) of tensor '{tensor}' are too small for its format and stored as 0"));
     }
-    if !report.converged {
-        console.warn("the bounces did not converge; raise solver.max_sweeps or solver.tolerance");
+    if !report.converged && !config.transport.is_limited() {
+        console.warn(
+            "the bounces did not converge; raise transport.bounces.max_iterations or transport.bounces.tolerance",
+        );
     }
     for (tensor, &count) in numerics.clamped.iter().filter(|c| *c.1 > 0) {
         console.warn(format!("{count} value(s) of tensor '{tensor}' are beyond its format's range and clamped"));
@@ -293,12 +273,12 @@ fn summary(report: &BakeReport, output: &Path) -> String {
     format!("{}\n{}\nwrote {}", table, plan_summary(&report.plan), output.display())
 }
 
-/// How many sweeps, and what they leave.
+/// How many there are, and by how many iterations where these are combined.
 fn bounces(report: &BakeReport) -> String {
-    let sweeps = report.bounces.len().saturating_sub(1);
+    let iterations = report.bounces.len();
     match report.solver.accelerated {
-        0 => sweeps.to_string(),
-        _ => format!("all, by {sweeps} sweeps"),
+        0 => report.bounces.last().map_or(0, |bounce| bounce.index).to_string(),
+        _ => format!("all, by {iterations} iterations"),
     }
 }
 

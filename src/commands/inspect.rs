@@ -42,7 +42,7 @@ fn axes(volume: &Volume, probe: ProbeIndex) -> [(&'static str, Vec3); 6] {
 }
 
 fn position_world(volume: &Volume, probe: ProbeIndex) -> [f64; 3] {
-    (volume.grid.origin_world + volume.position(probe).as_dvec3()).to_array()
+    (volume.grid.origin_world() + volume.position(probe).as_dvec3()).to_array()
 }
 
 fn to_json(file: &ProbeFile, probe: Option<u32>) -> Value {
@@ -62,16 +62,17 @@ fn to_json(file: &ProbeFile, probe: Option<u32>) -> Value {
         "file_bytes": file.file_bytes,
         "grid": {
             "kind": "uniform",
-            "origin": volume.grid.origin_world.to_array(),
-            "spacing": volume.grid.spacing.to_array(),
-            "divisions": volume.grid.divisions.to_array(),
+            "origin": volume.grid.origin_world().to_array(),
+            "spacing": volume.grid.spacing().to_array(),
+            "divisions": volume.grid.divisions().to_array(),
             "border": file.border,
         },
         "probes": volume.states.len(),
         "probes_active": active,
         "probes_inside_geometry": inside,
         "probes_never_sampled": unsampled,
-        "encoding": {"irradiance": volume.curve.name(), "scale_irradiance": file.irradiance_scale},
+        "encoding": {"irradiance": volume.irradiance.describe(), "occlusion": volume.occlusion.describe()},
+        "query": file.query,
         "tensors": tensors,
         "scene": file.scene,
         "seed": file.seed,
@@ -101,20 +102,21 @@ fn to_text(file: &ProbeFile, probe: Option<u32>) -> String {
          scene     {} (BLAKE3 {}), seed {}\n\
          grid      uniform, {} × {} × {} probes, spacing {} m, origin {} m, border {}\n\
          probes    {} ({active} active, {inside} inside geometry, {unsampled} never sampled)\n\
-         encoding  irradiance {}, scale {}\n",
+         irradiance {}\n\
+         occlusion  {}\n",
         format::bytes(file.file_bytes),
         file.scene.name,
         file.scene.blake3,
         file.seed.map_or_else(|| "not known".to_owned(), |seed| seed.to_string()),
-        grid.divisions.x,
-        grid.divisions.y,
-        grid.divisions.z,
-        grid.spacing,
-        grid.origin_world,
+        grid.divisions().x,
+        grid.divisions().y,
+        grid.divisions().z,
+        grid.spacing(),
+        grid.origin_world(),
         file.border,
         volume.states.len(),
-        volume.curve.name(),
-        file.irradiance_scale,
+        volume.irradiance.describe(),
+        volume.occlusion.describe(),
     );
     let mut table = Table::new(&[
         ("tensor", Column::Text),

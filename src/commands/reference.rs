@@ -3,27 +3,27 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
 use super::camera::cameras;
-use super::{
-    Console, check_apart_from, check_picture_memory, inputs, load_scene, peak_memory_bytes, resolve_config,
-    set_threads, tell, write_json,
-};
+use super::session::{Opening, Session, resolve_config};
+use super::{Console, check_picture_memory, tell, write_json};
 use crate::cli::{ReferenceArgs, TransportName};
+use crate::config::Config;
 use crate::light::World;
 use crate::light::bsdf::Transport;
 use crate::light::path::Strategy;
 use crate::math::blocks::BLOCK;
-use crate::report::header::Header;
 use crate::report::reference::{NoiseReport, Rays, ReferenceReport, ReferenceTimes, SCHEMA};
 use crate::report::table::{Column, Table};
+use crate::scene::Camera;
 use crate::shade::film::Noise;
 use crate::shade::points::has_blend;
-use crate::shade::reference::{ReferenceSettings, State, Tracing};
+use crate::shade::reference::{Reference, ReferenceSettings, State, Tracing};
 use crate::shade::reference_file::{Identity, resume};
 use crate::system::format;
-use crate::system::output::{Named, check_outputs};
+use crate::system::memory::peak_memory_bytes;
+use crate::system::output::Named;
 
 /// How much work a kill may lose.
 const SAVE_INTERVAL: Duration = Duration::from_secs(60);
@@ -39,55 +39,29 @@ pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
     }
     check_extension(&args.output)?;
     let config = resolve_config(&args.config, &args.trace)?;
-    let outputs: Vec<Named> = [Named::new("-o", &args.output)]
-        .into_iter()
-        .chain(args.report.as_ref().map(|report| Named::new("--report", report)))
-        .collect();
-    let config_file = args.config.config.as_ref().map(|file| Named::new("the configuration", file));
-    check_outputs(&outputs, &inputs(&args.scene, &args.trace, config_file))?;
-    let threads = set_threads(args.trace.threads)?;
-
-    let started = Instant::now();
     tell::configuration(console, &args.config);
-    let mut times = ReferenceTimes::default();
-    let scene = load_scene(&args.scene, &args.trace, &config, console)?;
-    check_apart_from(&scene, &outputs)?;
-    times.load = started.elapsed().as_secs_f64();
-    tell::scene(console, &args.scene, &scene, times.load);
-    let accel_started = Instant::now();
-    let world = World::new(&scene, config.lights.punctual_scale, config.solver.albedo_max)?;
-    times.accel_build = accel_started.elapsed().as_secs_f64();
-    tell::accel(console, times.accel_build);
-
-    let settings = ReferenceSettings {
-        spp: args.spp,
-        seed: args.trace.seed,
-        transport: match args.transport {
-            TransportName::Lambert => Transport::Lambert,
-            TransportName::Gltf => Transport::Gltf,
-        },
-        max_bounces: args.max_bounces,
-        strategy: Strategy::Mis,
-        firefly_clamp: args.firefly_clamp,
-    };
-    let found = cameras(&args.view, &world, console)?;
-    let Some(camera) = found.first() else { bail!("there is no camera; use --look-at") };
+    let session = Session::open(opening(args, &config), console)?;
+    let (world, accel_build_s) = session.world()?;
+    let settings = settings(args);
+    let camera = cameras(&args.view, &world, console)?.into_iter().next().context("there is no camera; use --look-at")?;
     let size = args.view.size;
     let layered = settings.transport == Transport::Gltf || has_blend(&world);
     check_picture_memory(size, if layered { LAYERED_PIXEL_BYTES } else { PIXEL_BYTES })?;
-    let identity = Identity::new(&world, camera, size.width, size.height, &settings);
-    let previous = previous(args, &identity, &world, &settings, console)?;
-    let (spp_resumed, rays_before) = previous.as_ref().map_or((0, 0), |p| (p.film.blocks * BLOCK, p.rays.total()));
 
-    let mut tracing = Tracing::new(&world, camera, size.width, size.height, &settings, previous);
-    tell::reference_begins(console, &camera.name, size, settings.rounded_spp(), spp_resumed);
+    let identity = Identity::new(&world, &camera, size.width, size.height, &settings);
+    let before = previous(args, &identity, &world, &settings, console)?;
+    let resumed = before.as_ref().map_or(Resumed::default(), |state| Resumed {
+        spp: state.film.blocks * BLOCK,
+        rays: state.rays.total(),
+    });
+    let mut tracing = Tracing::new(&world, &camera, size.width, size.height, &settings, before);
+    tell::reference_begins(console, &camera.name, size, settings.rounded_spp(), resumed.spp);
     let is_complete = tracing.remaining() == 0;
     if is_complete {
-        console.warn(format!(
-            "{} has {spp_resumed} samples per pixel already: there is nothing to add; raise --spp for more",
-            args.output.display()
-        ));
+        let (file, spp) = (args.output.display(), resumed.spp);
+        console.warn(format!("{file} has {spp} samples per pixel already: there is nothing to add; raise --spp for more"));
     }
+    let mut times = ReferenceTimes { load: session.load_s, accel_build: accel_build_s, ..Default::default() };
     times.trace = trace(&mut tracing, &args.output, &identity, console)?;
     let reference = tracing.develop();
     tell::traced(console, reference.spp, reference.rays, times.trace);
@@ -97,38 +71,80 @@ pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
         times.write = write_started.elapsed().as_secs_f64();
         tell::written(console, &args.output);
     }
-    times.total = started.elapsed().as_secs_f64();
-
+    times.total = session.elapsed_s();
     if reference.non_finite > 0 {
         console.warn(format!("{} samples were not finite and count as 0", reference.non_finite));
     }
-    let rays = reference.rays;
-    let report = ReferenceReport {
-        header: Header::new(SCHEMA, "reference", settings.seed, threads, &scene.blake3, config.to_ron()),
-        camera: camera.name.clone(),
-        width: size.width,
-        height: size.height,
-        transport: format!("{:?}", settings.transport).to_lowercase(),
-        max_bounces: settings.max_bounces,
-        firefly_clamp: settings.firefly_clamp,
-        spp: reference.spp,
-        spp_resumed,
-        rays: Rays { primary: rays.primary, shadow: rays.shadow },
-        time_s: times,
-        rays_per_s: (!is_complete && times.trace > 0.0).then(|| (rays.total() - rays_before) as f64 / times.trace),
-        noise: reference.noise.map(noise_report),
-        non_finite: reference.non_finite,
-        peak_memory_bytes: peak_memory_bytes(),
-    };
+    let report = report(&session, &config, args, (&camera, &settings, resumed), &reference, times);
     if let Some(path) = &args.report {
         write_json(path, &report)?;
         tell::written(console, path);
     }
-    if console.json {
-        return console.print(&serde_json::to_string_pretty(&report)?);
-    }
     let outcome = if is_complete { "nothing to add to" } else { "wrote" };
-    console.print(&format!("{}\n{outcome} {}", summary(&report), args.output.display()))
+    session.print(&report, || format!("{}\n{outcome} {}", summary(&report), args.output.display()))
+}
+
+fn opening<'a>(args: &'a ReferenceArgs, config: &Config) -> Opening<'a> {
+    let report = args.report.as_ref().map(|report| Named::new("--report", report));
+    let config_file = args.config.config.as_ref().map(|file| Named::new("the configuration", file));
+    Opening {
+        scene: &args.scene,
+        trace: &args.trace,
+        light: config.light(),
+        keep_images: false,
+        inputs: config_file.into_iter().collect(),
+        outputs: [Named::new("-o", &args.output)].into_iter().chain(report).collect(),
+    }
+}
+
+fn settings(args: &ReferenceArgs) -> ReferenceSettings {
+    ReferenceSettings {
+        spp: args.spp,
+        seed: args.trace.seed,
+        transport: match args.transport {
+            TransportName::Lambert => Transport::Lambert,
+            TransportName::Gltf => Transport::Gltf,
+        },
+        max_bounces: args.max_bounces,
+        strategy: Strategy::Mis,
+        firefly_clamp: args.firefly_clamp,
+    }
+}
+
+/// What was there before this run.
+#[derive(Clone, Copy, Default)]
+struct Resumed {
+    spp: u32,
+    rays: u64,
+}
+
+fn report(
+    session: &Session,
+    config: &Config,
+    args: &ReferenceArgs,
+    (camera, settings, resumed): (&Camera, &ReferenceSettings, Resumed),
+    reference: &Reference,
+    time_s: ReferenceTimes,
+) -> ReferenceReport {
+    let rays = reference.rays;
+    let traced = (rays.total() - resumed.rays) as f64;
+    ReferenceReport {
+        header: session.header(SCHEMA, "reference", config.to_ron()),
+        camera: camera.name.clone(),
+        width: args.view.size.width,
+        height: args.view.size.height,
+        transport: format!("{:?}", settings.transport).to_lowercase(),
+        max_bounces: settings.max_bounces,
+        firefly_clamp: settings.firefly_clamp,
+        spp: reference.spp,
+        spp_resumed: resumed.spp,
+        rays: Rays { primary: rays.primary, shadow: rays.shadow },
+        time_s,
+        rays_per_s: (traced > 0.0 && time_s.trace > 0.0).then(|| traced / time_s.trace),
+        noise: reference.noise.map(noise_report),
+        non_finite: reference.non_finite,
+        peak_memory_bytes: peak_memory_bytes(),
+    }
 }
 
 /// An EXR by the name of another format would be found out by whoever opens it.

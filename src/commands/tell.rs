@@ -15,11 +15,10 @@ use crate::system::format;
 
 /// Where the configuration in effect comes from.
 pub fn configuration(console: &Console, args: &ConfigArgs) {
-    let base = match (&args.config, &args.preset) {
-        (Some(path), _) => path.display().to_string(),
-        (None, preset) => format!("preset {}", preset.as_deref().unwrap_or("default")),
-    };
-    let text = args.set.iter().fold(base, |text, set| format!("{text}, --set {set}"));
+    let preset = format!("preset {}", args.preset.as_deref().unwrap_or("default"));
+    let file = args.config.iter().map(|path| path.display().to_string());
+    let sets = args.set.iter().map(|set| format!("--set {set}"));
+    let text = [preset].into_iter().chain(file).chain(sets).collect::<Vec<_>>().join(", ");
     console.say(format!("configuration: {text}"));
 }
 
@@ -41,17 +40,18 @@ pub fn accel(console: &Console, seconds: f64) {
 
 pub fn prepared(console: &Console, prepared: &Prepared) {
     let grid = &prepared.grid;
-    let [x, y, z] = grid.divisions.to_array();
-    console.say(format!("grid: {x} × {y} × {z} probes, spacing {} m, origin {} m", grid.spacing, grid.origin_world));
+    let [x, y, z] = grid.divisions().to_array();
+    let (spacing, origin) = (grid.spacing(), grid.origin_world());
+    console.say(format!("grid: {x} × {y} × {z} probes, spacing {spacing} m, origin {origin} m"));
     let placement = &prepared.placement;
-    let count = |state| placement.states.iter().filter(|&&s| s == state).count();
+    let count = |state| placement.count(state);
     console.say(format!(
         "placement: {} probes active, {} inside geometry, {} never sampled, {} moved; with the survey {} rays in {}",
         count(ProbeState::Active),
         count(ProbeState::InsideGeometry),
         count(ProbeState::NeverSampled),
         placement.relocated,
-        prepared.survey_rays,
+        placement.rays,
         format::seconds(prepared.survey_s),
     ));
     prepared.plan.lines.iter().for_each(|line| plan_line(console, line));
@@ -71,8 +71,8 @@ pub fn baked(console: &Console, baked: &Baked) {
         format::seconds(times.capture)
     ));
     console.say(format!(
-        "bounces: {} in {}, {}",
-        baked.solution.bounces.len().saturating_sub(1),
+        "bounces: {} iterations in {}, {}",
+        baked.solution.bounces.len(),
         format::seconds(times.bounces),
         if baked.solution.converged { "converged" } else { "not converged" }
     ));
@@ -82,7 +82,7 @@ pub fn baked(console: &Console, baked: &Baked) {
 }
 
 pub fn probes(console: &Console, path: &Path, file: &ProbeFile) {
-    let [x, y, z] = file.volume_in_grid().grid.divisions.to_array();
+    let [x, y, z] = file.volume_in_grid().grid.divisions().to_array();
     console.say(format!(
         "probes: {}, {}, {x} × {y} × {z}, {} active, all hashes match",
         path.display(),

@@ -69,7 +69,7 @@ pub struct SolverReport {
 impl SolverReport {
     pub fn of(solution: &Solution) -> SolverReport {
         SolverReport {
-            operator_applications: solution.bounces.len() + solution.probing_sweeps,
+            operator_applications: solution.bounces.len() + solution.probing_applications,
             accelerated: solution.bounces.iter().filter(|bounce| bounce.accelerated).count(),
             operator_norm: solution.norm_bound(),
             error_bound: solution.error_bound,

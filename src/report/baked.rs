@@ -6,9 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::terms::fold;
 use crate::math::color::luminance;
-use crate::math::octahedral::{solid_angle_density, texel_centre};
 use crate::probe::Volume;
-use crate::probe::store::map::interior_texel;
 use crate::probe::transport::truth::Truth;
 
 /// Sums run over all texels of active probes by their solid angle, in luminance. All are shares of ΣE_path.
@@ -62,9 +60,7 @@ pub fn measure(volume: &Volume, truth: &Truth) -> (BakedFigures, BakedFigures) {
 
 /// The figures against all runs of the truth but one.
 fn figures(volume: &Volume, truth: &Truth, without: Option<usize>) -> BakedFigures {
-    let maps = &volume.irradiance;
-    let resolution = maps.resolution;
-    let interior = interior_texel(resolution, maps.border);
+    let axes = volume.irradiance.axes();
     let used: Vec<usize> = (0..truth.runs.len()).filter(|&run| Some(run) != without).collect();
     let n = used.len() as f64;
     let mut sums = Sums::default();
@@ -72,15 +68,12 @@ fn figures(volume: &Volume, truth: &Truth, without: Option<usize>) -> BakedFigur
         let texels = truth.runs[0][p].len();
         // Per texel: solid angle, difference, variance of the truth's mean.
         let mut found = Vec::with_capacity(texels);
-        for o in 0..texels {
-            let (column, row) = (o % resolution, o / resolution);
-            let oct = glam::Vec2::new(texel_centre(column, resolution), texel_centre(row, resolution));
-            let weight = f64::from(solid_angle_density(oct));
-            let stored = volume.curve.decode(maps.probe(p)[interior(o)]);
+        for (o, stored) in volume.irradiance.probe(p).take(texels).enumerate() {
+            let weight = f64::from(axes[o].1);
             let of = |e: Vec3A| f64::from(luminance(e.into()));
             let mean = used.iter().map(|&run| of(truth.runs[run][p][o])).sum::<f64>() / n;
             let spread = used.iter().map(|&run| (of(truth.runs[run][p][o]) - mean).powi(2)).sum::<f64>();
-            found.push((weight, of(stored) - mean, spread / (n * (n - 1.0))));
+            found.push((weight, of(stored.into()) - mean, spread / (n * (n - 1.0))));
             sums.truth += weight * mean;
         }
         // How large differences are, from all of the probe's texels: that of one is as noisy as itself.

@@ -57,9 +57,9 @@ pub fn exact_masks(world: &World, query: &Query, points: &[ImagePoint]) -> Vec<u
         .par_iter()
         .map(|point| {
             let origin = point.surface.ray_origin();
-            let cell = volume.grid.cell(point.surface.position);
+            let cell = query.cell(&point.query());
             (0..8).fold(0, |mask, i| {
-                let probe = volume.grid.corner(cell.base, i);
+                let probe = volume.grid.corner(&cell, i);
                 let position = volume.position(probe);
                 // A probe behind the surface is hidden by the surface itself.
                 let visible = volume.is_active(probe)

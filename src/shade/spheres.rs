@@ -32,7 +32,7 @@ pub fn draw(scene_picture: &Picture8, view: &View, camera: &Camera, volume: &Vol
         let d = &mut depth[point.pixel as usize];
         *d = d.min(point.depth);
     }
-    let radius = RADIUS * volume.grid.spacing.min_element();
+    let radius = RADIUS * volume.grid.spacing_min();
     for p in 0..volume.states.len() {
         let centre = volume.positions[p];
         let Some(Disc { low, high, radius_px }) = disc(camera, centre, radius, width, height) else { continue };

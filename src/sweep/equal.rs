@@ -6,7 +6,8 @@ use crate::report::sweep::{
     AxisValue, BudgetEntry, ConfigurationReport, EqualBudget, EqualEntry, EqualReport, EqualSet, LadderReport,
 };
 
-/// Gives every configuration the grid and the placement of the first one with the same values of the axes.
+/// Gives every configuration the grid of the first one with the same values of the axes; placement and refinement are the
+/// method's own.
 pub fn share_positions(ladders: &mut [Ladder]) {
     for at in 1..ladders.len() {
         let (before, rest) = ladders.split_at_mut(at);
@@ -14,7 +15,6 @@ pub fn share_positions(ladders: &mut [Ladder]) {
             let model = before.iter().flat_map(|ladder| &ladder.rungs).find(|model| model.axes == rung.axes);
             if let Some(model) = model {
                 rung.config.grid = model.config.grid.clone();
-                rung.config.placement = model.config.placement.clone();
             }
         }
     }

@@ -7,8 +7,7 @@
 use super::SweepError;
 use super::run::{Finished, Setting};
 use crate::bake::BakeError;
-use crate::config::{Config, ConfigError};
-use crate::probe::store::encode::ColorFormat;
+use crate::config::Config;
 use crate::report::sweep::{FloorCause, FloorReport, RunRecord};
 use crate::shade::methods::Method;
 
@@ -22,9 +21,6 @@ const MAX_RESOLUTION: usize = 1024;
 const TOLERANCE_SHARE: f32 = 0.1;
 const TOLERANCE_LEAST: f32 = 1e-6;
 
-/// Overrides that switch a limit off: the second where the first is not known.
-const UNLIMITED_BOUNCES: [&str; 2] = ["solver.max_bounces=None", "solver.max_bounces=1048576"];
-
 /// A configuration with a cause of error switched off.
 struct Variant {
     cause: &'static str,
@@ -33,36 +29,32 @@ struct Variant {
     config: Option<Config>,
 }
 
-fn variants(config: &Config) -> Result<[Variant; 3], ConfigError> {
-    let double = |n: usize| (2 * n).min(MAX_RESOLUTION);
-    let angular = [
-        format!("filter.irradiance_resolution={}", double(config.filter.irradiance_resolution)),
-        format!("capture.resolution={}", double(config.capture.resolution)),
-    ];
-    let tolerance = (TOLERANCE_SHARE * config.solver.tolerance).max(TOLERANCE_LEAST);
-    let bounced =
-        |limit: &str| config.clone().with_overrides(&[limit.to_owned(), format!("solver.tolerance={tolerance}")]);
-    let bounces = bounced(UNLIMITED_BOUNCES[0]).or_else(|_| bounced(UNLIMITED_BOUNCES[1]))?;
-    let format = "encoding.irradiance=f32";
-    let is_exact = config.encoding.irradiance == ColorFormat::F32;
-    let encoded = if is_exact { None } else { Some(config.clone().with_overrides(&[format.to_owned()])?) };
-    Ok([
+fn variants(config: &Config) -> [Variant; 3] {
+    let mut angular = config.clone();
+    angular.capture.rays = config.capture.rays.doubled(MAX_RESOLUTION);
+    angular.store.irradiance = config.store.irradiance.doubled(MAX_RESOLUTION);
+    let transport = config.transport.settled(TOLERANCE_SHARE, TOLERANCE_LEAST);
+    let settled = (transport != config.transport).then(|| Config { transport, ..config.clone() });
+    let exact = config.store.irradiance.exact().map(|irradiance| {
+        let mut exact = config.clone();
+        exact.store.irradiance = irradiance;
+        exact
+    });
+    let or_already = |how: &str, config: &Option<Config>| match config {
+        Some(_) => how.to_owned(),
+        None => "there is none already".to_owned(),
+    };
+    let bounces = "all bounces, to a tenth of the tolerance";
+    let encoding = "irradiance stored in single precision";
+    [
         Variant {
             cause: "angular_resolution",
-            how: angular.join(", "),
-            config: Some(config.clone().with_overrides(&angular)?),
+            how: "captures and irradiance of twice the angular resolution".to_owned(),
+            config: Some(angular),
         },
-        Variant {
-            cause: "bounces",
-            how: format!("no limit of bounces, solver.tolerance={tolerance}"),
-            config: Some(bounces),
-        },
-        Variant {
-            cause: "encoding",
-            how: if is_exact { "it is f32 already" } else { format }.to_owned(),
-            config: encoded,
-        },
-    ])
+        Variant { cause: "bounces", how: or_already(bounces, &settled), config: settled },
+        Variant { cause: "encoding", how: or_already(encoding, &exact), config: exact },
+    ]
 }
 
 fn error_of(record: &RunRecord, method: Method) -> Option<f64> {
@@ -96,7 +88,7 @@ pub fn measure(
         share: share(all, remaining),
     };
     let mut causes = Vec::new();
-    for variant in variants(config)? {
+    for variant in variants(config) {
         let Some(changed) = &variant.config else {
             causes.push(cause(variant.cause, &variant.how, all));
             step();
@@ -145,16 +137,15 @@ mod tests {
     #[test]
     fn every_variant_differs_in_its_cause_only() {
         let config = Config::default();
-        let [angular, bounces, encoding] = variants(&config).unwrap();
-        let angular = angular.config.unwrap();
-        assert_eq!((angular.filter.irradiance_resolution, angular.capture.resolution), (16, 64));
-        assert_eq!(Config { filter: config.filter.clone(), capture: config.capture.clone(), ..angular }, config);
-        let bounces = bounces.config.unwrap();
-        assert!(bounces.solver.tolerance < config.solver.tolerance && bounces.solver != config.solver);
-        assert_eq!(Config { solver: config.solver.clone(), ..bounces }, config);
-        assert_eq!(encoding.config.as_ref().unwrap().encoding.irradiance, ColorFormat::F32);
-        let exact = encoding.config.unwrap();
-        assert!(variants(&exact).unwrap()[2].config.is_none());
+        let [angular, bounces, encoding] = variants(&config).map(|variant| variant.config.unwrap());
+        assert_eq!((angular.store.irradiance.unknowns(), angular.capture.rays.texels()), (16 * 16, 64 * 64));
+        assert_eq!(Config { store: config.store.clone(), capture: config.capture.clone(), ..angular }, config);
+        assert!(bounces.transport != config.transport);
+        assert_eq!(Config { transport: config.transport.clone(), ..bounces }, config);
+        assert_eq!(encoding.store.irradiance.fineness().rounding, 2f64.powi(-24));
+        assert!(variants(&encoding)[2].config.is_none());
+        let path = config.with_overrides(&["transport=paths(paths: 2)".to_owned()]).unwrap();
+        assert!(variants(&path)[1].config.is_none());
     }
 
     #[test]

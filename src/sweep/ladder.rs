@@ -5,9 +5,9 @@
 //! ```ron
 //! (ladders: [(
 //!     name: "spacing",
-//!     preset: "default",                     // or config: "file.ron"; neither: the methods of the command line
-//!     set: ["solver.max_bounces=8"],
-//!     axes: [(key: "grid.spacing_m", values: [1.0, 0.5]), (key: "encoding.irradiance", values: [f16, f32])],
+//!     preset: "default",                     // and config: "file.ron"; neither: the methods of the command line
+//!     set: ["transport.bounces.max_bounces=8"],
+//!     axes: [(key: "grid.spacing_m", values: [1.0, 0.5]), (key: "query.visibility", values: [none])],
 //! )])
 //! ```
 //!
@@ -20,17 +20,44 @@ use ron::value::RawValue;
 use serde::Deserialize;
 
 use super::SweepError;
-use crate::config::{Config, ConfigError, presets};
+use crate::config::{Config, ConfigError, Layers};
 use crate::system::input::read_file;
 
 /// Configurations of a sweep at most: more is a mistake in an axis.
 const MOST: usize = 4096;
 
-/// A configuration that ladders start from.
+/// What ladders start from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Method {
     pub name: String,
-    pub config: Config,
+    pub layers: Layers,
+}
+
+impl Method {
+    /// A preset, and files over it; without a preset over the defaults. Both name it.
+    ///
+    /// # Errors
+    /// There is no such preset; a file cannot be read.
+    pub fn new(preset: Option<&str>, files: &[PathBuf]) -> Result<Method, ConfigError> {
+        let mut layers = Layers::default();
+        let mut names = Vec::new();
+        if let Some(name) = preset {
+            layers = layers.preset(name)?;
+            names.push(name.to_owned());
+        }
+        for path in files {
+            layers = layers.file(path)?;
+            let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+            names.push(stem.unwrap_or_else(|| path.display().to_string()));
+        }
+        // What is held alike by all is no part of a method's name.
+        let name = match preset {
+            Some(preset) => preset.to_owned(),
+            None if names.is_empty() => "default".to_owned(),
+            None => names.join(", "),
+        };
+        Ok(Method { name, layers })
+    }
 }
 
 /// One configuration of a ladder.
@@ -107,9 +134,6 @@ impl LadderFile {
             if !names.insert(name) {
                 return Err(error(format!("two ladders are named '{name}'; rename one")));
             }
-            if entry.preset.is_some() && entry.config.is_some() {
-                return Err(error(format!("ladder '{name}' has preset and config; remove one")));
-            }
             if let Some(axis) = entry.axes.iter().find(|axis| axis.values.is_empty()) {
                 return Err(error(format!(
                     "ladder '{name}': the axis {} has no values; give some or remove it",
@@ -135,20 +159,12 @@ impl LadderFile {
     }
 
     fn own_method(&self, entry: &Entry) -> Result<Option<Method>, SweepError> {
-        Ok(match (&entry.preset, &entry.config) {
-            (Some(name), _) => Some(Method { name: name.clone(), config: presets::find(name)? }),
-            (None, Some(file)) => {
-                let path = self.beside(file);
-                Some(Method { name: method_name(&path), config: Config::load(&path)? })
-            }
-            (None, None) => None,
-        })
+        if entry.preset.is_none() && entry.config.is_none() {
+            return Ok(None);
+        }
+        let files: Vec<PathBuf> = entry.config.iter().map(|file| self.beside(file)).collect();
+        Ok(Some(Method::new(entry.preset.as_deref(), &files)?))
     }
-}
-
-/// What a configuration file is called in tables.
-pub fn method_name(path: &Path) -> String {
-    path.file_stem().map_or_else(|| path.display().to_string(), |stem| stem.to_string_lossy().into_owned())
 }
 
 /// All ladders: every one of the file that has no method of its own with each of `methods`; without a file one ladder with one
@@ -165,7 +181,7 @@ pub fn expand(
     let mut ladders = Vec::new();
     let Some(file) = file else {
         for method in methods {
-            let mut config = method.config.clone().with_overrides(set)?;
+            let mut config = method.layers.clone().set(set)?.config()?;
             finish(&mut config);
             let rung = Rung { label: method.name.clone(), axes: Vec::new(), config };
             ladders.push(Ladder { name: method.name.clone(), method: method.name.clone(), rungs: vec![rung] });
@@ -187,8 +203,11 @@ pub fn expand(
         }
         for method in starts {
             let name = if starts.len() > 1 { format!("{}: {}", method.name, entry.name) } else { entry.name.clone() };
-            let base = method.config.clone().with_overrides(&entry.set).map_err(|e| in_ladder(&place, &e))?;
-            let base = base.with_overrides(set)?;
+            let base = method.layers.clone().set(&entry.set).map_err(|e| in_ladder(&place, &e))?;
+            // Mistakes of the ladder are told from those of the command line.
+            base.config().map_err(|e| in_ladder(&place, &e))?;
+            let base = base.set(set)?;
+            base.config()?;
             let rungs = rungs(&name, &base, &entry.axes, &finish).map_err(|e| in_ladder(&place, &e))?;
             ladders.push(Ladder { name, method: method.name.clone(), rungs });
         }
@@ -203,28 +222,29 @@ fn in_ladder(place: &str, error: &ConfigError) -> SweepError {
 }
 
 /// The product of the axes.
-fn rungs(name: &str, base: &Config, axes: &[Axis], finish: &dyn Fn(&mut Config)) -> Result<Vec<Rung>, ConfigError> {
+fn rungs(name: &str, base: &Layers, axes: &[Axis], finish: &dyn Fn(&mut Config)) -> Result<Vec<Rung>, ConfigError> {
     let mut found = vec![(Vec::new(), base.clone())];
     for axis in axes {
         let mut next = Vec::with_capacity(found.len() * axis.values.len());
-        for (values, config) in &found {
+        for (values, layers) in &found {
             for value in &axis.values {
                 let value = value.get_ron().trim();
-                let config = config.clone().with_overrides(&[format!("{}={value}", axis.key)])?;
+                let layers = layers.clone().set(&[format!("{}={value}", axis.key)])?;
                 let values: &Vec<(String, String)> = values;
-                next.push(([&values[..], &[(axis.key.clone(), value.to_owned())]].concat(), config));
+                next.push(([&values[..], &[(axis.key.clone(), value.to_owned())]].concat(), layers));
             }
         }
         found = next;
     }
-    let rung = |(axes, mut config): (Vec<(String, String)>, Config)| {
+    let rung = |(axes, layers): (Vec<(String, String)>, Layers)| {
+        let mut config = layers.config()?;
         finish(&mut config);
         let short = |key: &str| key.rsplit('.').next().unwrap_or(key).to_owned();
         let parts: Vec<String> = axes.iter().map(|(key, value)| format!("{}={value}", short(key))).collect();
         let label = if parts.is_empty() { name.to_owned() } else { format!("{name} {}", parts.join(" ")) };
-        Rung { label, axes, config }
+        Ok(Rung { label, axes, config })
     };
-    Ok(found.into_iter().map(rung).collect())
+    found.into_iter().map(rung).collect()
 }
 
 /// Refuses ladders that cannot share a reference: its light and its albedos are those of the scene.
@@ -238,7 +258,7 @@ pub fn check_shared(ladders: &[Ladder]) -> Result<(), SweepError> {
     let keys: [(&'static str, Value); 3] = [
         ("lights.punctual_scale", |c| c.lights.punctual_scale.to_string()),
         ("lights.sky", |c| c.lights.sky.map_or("None".to_owned(), |sky| format!("{sky:?}"))),
-        ("solver.albedo_max", |c| c.solver.albedo_max.to_string()),
+        ("materials.albedo_max", |c| c.materials.albedo_max.to_string()),
     ];
     for (key, value) in keys {
         if let Some(other) = rungs().find(|rung| value(&rung.config) != value(&first.config)) {
@@ -257,10 +277,11 @@ pub fn check_shared(ladders: &[Ladder]) -> Result<(), SweepError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::probe::query::VisibilitySettings;
+    use crate::probe::query::VisibilityTest;
+    use crate::probe::transport::Transport;
 
     fn expanded(text: &str) -> Result<Vec<Ladder>, SweepError> {
-        let methods = [Method { name: "default".to_owned(), config: Config::default() }];
+        let methods = [Method::new(None, &[]).unwrap()];
         expand(Some(&LadderFile::parse(text, Path::new("a.ron"))?), &methods, &["placement.rays=64".to_owned()], |_| {})
     }
 
@@ -277,16 +298,20 @@ mod tests {
         let rungs = &ladders[0].rungs;
         assert_eq!(rungs.len(), 6);
         assert_eq!(rungs[1].label, "a spacing_m=1.0 visibility=moments(power: 3, floor: 0.05)");
-        assert_eq!(rungs[1].config.query.visibility, VisibilitySettings::Moments { power: 3.0, floor: 0.05 });
-        assert_eq!((rungs[5].config.grid.spacing_m, rungs[5].config.solver.tolerance), (Some(0.5), 1e-3));
-        assert!(rungs.iter().all(|rung| rung.config.placement.rays == 64));
+        assert_eq!(rungs[1].config.query.test, VisibilityTest::Chebyshev { power: 3.0, floor: 0.05 });
+        assert_eq!(rungs[5].config.grid.spacing_m, Some(0.5));
+        let expected = Config::default().with_overrides(&["solver.tolerance=1e-3".to_owned(), "placement.rays=64".to_owned()]);
+        let expected = expected.unwrap();
+        assert!(rungs.iter().all(|rung| rung.config.transport == expected.transport));
+        assert!(rungs.iter().all(|rung| rung.config.placement == expected.placement));
+        assert!(matches!(ladders[1].rungs[0].config.transport, Transport::Paths { .. }));
         assert_eq!((ladders[1].method.as_str(), ladders[1].rungs.len()), ("path", 1));
         assert_eq!(ladders[1].rungs[0].label, "b");
     }
 
     #[test]
     fn a_method_each_where_there_are_several() {
-        let methods = ["one", "two"].map(|name| Method { name: name.to_owned(), config: Config::default() });
+        let methods = ["one", "two"].map(|name| Method { name: name.to_owned(), layers: Layers::default() });
         let file = "(ladders: [(name: \"a\", axes: [(key: \"grid.spacing_m\", values: [1, 2])])])";
         let file = LadderFile::parse(file, Path::new("a.ron")).unwrap();
         let ladders = expand(Some(&file), &methods, &[], |_| {}).unwrap();
@@ -321,7 +346,7 @@ mod tests {
     #[test]
     fn what_the_reference_depends_on_must_agree() {
         for (key, value) in
-            [("lights.punctual_scale", "2.0"), ("solver.albedo_max", "0.5"), ("lights.sky", "(1, 1, 1)")]
+            [("lights.punctual_scale", "2.0"), ("materials.albedo_max", "0.5"), ("lights.sky", "(1, 1, 1)")]
         {
             let text = format!("(ladders: [(name: \"a\"), (name: \"b\", set: [\"{key}={value}\"])])");
             let error = check_shared(&expanded(&text).unwrap()).unwrap_err().to_string();

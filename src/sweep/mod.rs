@@ -17,7 +17,7 @@ use std::path::PathBuf;
 use crate::bake::BakeError;
 use crate::config::ConfigError;
 use crate::image::ImageError;
-use crate::probe::file::container::FileError;
+use crate::probe::container::FileError;
 use crate::system::output::OutputError;
 
 /// Why there is no sweep.

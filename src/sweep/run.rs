@@ -6,7 +6,7 @@ use super::SweepError;
 use super::store::{Key, Store, Stored};
 use crate::bake::{Baked, Circumstances, prepare};
 use crate::config::Config;
-use crate::evaluate::{BakedTruth, Comparison, Scenery, Shaded, runtime_bytes, volume_as_planned};
+use crate::evaluate::{BakedTruth, Comparison, Scenery, Shaded};
 use crate::image::Picture;
 use crate::probe::Volume;
 use crate::probe::file::{self, ProbeFile, SceneRecord};
@@ -86,7 +86,10 @@ impl Setting<'_, '_> {
         }
         let bake = self.bake(label, config, seed)?;
         let world = self.scenery.world;
-        let truth = BakedTruth::trace(world, config, &bake.volume, &self.reference_settings, Progress::hidden());
+        let ReferenceSettings { spp, seed: truth_seed, .. } = self.reference_settings;
+        let paths = BakedTruth::paths_for(spp);
+        let truth =
+            BakedTruth::trace(world, &config.capture, &bake.volume, paths, truth_seed, Progress::hidden());
         let file_query = Query { volume: &bake.volume, settings: &config.query };
         let (masks, masks_s) = self.scenery.masks(&file_query);
         let query = Query { volume: &truth.truth.volume, settings: &config.query };
@@ -107,8 +110,7 @@ impl Setting<'_, '_> {
     /// Bakes, writes the file and reads it back: what is judged is what a user gets.
     fn bake(&self, label: &str, config: &Config, seed: u64) -> Result<Bake, SweepError> {
         let scene = self.scenery.world.scene;
-        let progress = Progress::hidden();
-        let circumstances = Circumstances { seed, memory_budget_bytes: None, progress, checkpoint: None };
+        let circumstances = Circumstances::quiet(seed);
         let record = SceneRecord { name: scene.name.clone(), blake3: scene.blake3.clone() };
         let baked = prepare(self.scenery.world, config, &circumstances).and_then(|p| p.bake(&circumstances, &record));
         let baked = baked.map_err(|cause| SweepError::Bake { label: label.to_owned(), cause })?;
@@ -117,8 +119,8 @@ impl Setting<'_, '_> {
         let probes = file::read(&path)?;
         // It has served; the next run would replace it.
         let _ = std::fs::remove_file(&path);
-        let bytes_per_probe = runtime_bytes(&probes, config);
-        Ok(Bake { volume: volume_as_planned(&probes, scene), bytes_per_probe, baked, probes })
+        let (volume, bytes_per_probe) = (probes.volume_as_planned(scene.origin_world), probes.runtime_bytes());
+        Ok(Bake { volume, bytes_per_probe, baked, probes })
     }
 
     /// The three ways of treating visibility, compared with the reference.
@@ -151,7 +153,7 @@ impl Setting<'_, '_> {
             bake_s: times.total(),
             time_s: times,
             rays: baked.rays,
-            bounces: baked.solution.bounces.len().saturating_sub(1),
+            bounces: baked.solution.bounces.len(),
             converged: baked.solution.converged,
             methods: shaded.iter().map(|s| self.figures(s)).collect(),
         }

@@ -16,7 +16,7 @@ use crate::shade::regions::Region;
 
 /// Pictures of one configuration, accumulated (Welford's update).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Spread {
+pub struct SeedScatter {
     count: u32,
     mean: Vec<DVec3>,
     /// Σ(e − mean)².
@@ -40,9 +40,9 @@ impl Split {
     }
 }
 
-impl Spread {
-    pub fn new(pixels: usize) -> Spread {
-        Spread { count: 0, mean: vec![DVec3::ZERO; pixels], scatter: vec![DVec3::ZERO; pixels] }
+impl SeedScatter {
+    pub fn new(pixels: usize) -> SeedScatter {
+        SeedScatter { count: 0, mean: vec![DVec3::ZERO; pixels], scatter: vec![DVec3::ZERO; pixels] }
     }
 
     /// # Panics
@@ -107,7 +107,7 @@ mod tests {
     /// Two pictures at 2 + b ± a: the scatter is 2a², so noise = a√2, and (m − r)² − noise²/2 = b² − a².
     #[test]
     fn two_pictures_have_the_closed_form() {
-        let mut spread = Spread::new(PIXELS);
+        let mut spread = SeedScatter::new(PIXELS);
         let (a, b) = (0.25f32, 0.5f32);
         spread.add(&vec![Vec3::splat(2.0 + b + a); PIXELS]);
         assert_eq!(spread.split(&reference(None), &REGIONS), Split::default());
@@ -124,7 +124,7 @@ mod tests {
     #[test]
     fn noise_and_bias_are_told_apart() {
         for (width, b) in [(0.6f32, 0.05f32), (0.06, 0.4), (0.3, 0.0)] {
-            let mut spread = Spread::new(PIXELS);
+            let mut spread = SeedScatter::new(PIXELS);
             for seed in 0..4 {
                 let pixel = |i: usize| {
                     let mut random = Random::new(seed, Purpose::Pixel, i as u64, 0);

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use glam::Vec3;
 
-use super::Run;
 use super::reference::Reference;
 use crate::evaluate::Shaded;
 use crate::image::{LayeredImage, Picture8};
 use crate::math::color::luminance;
+use crate::probe::Volume;
 use crate::report::colormap::Scale;
 use crate::report::heatmap::{Heatmap, range_of};
 use crate::report::probe_key::{Entry, with_key};
@@ -27,9 +27,8 @@ const PROBE_KEY: &[Entry] = &[
 
 /// Writes all of a camera's pictures into `folder`, PNGs at one exposure.
 pub fn write(
-    run: &Run,
-    camera: &Camera,
-    view: &View,
+    volume: &Volume,
+    (camera, view): (&Camera, &View),
     shaded: &[Shaded; 3],
     reference: Option<&Reference>,
     exposure_ev: f32,
@@ -55,7 +54,7 @@ pub fn write(
     image.push("leak_off", off_leak.clone());
     image.write_exr(&file("leak", "exr"))?;
     leak_map(view, &off_leak, &on_leak).write_png(&file("leak", "png"))?;
-    let probes = spheres::draw(&tonemapped(&exact.image), view, camera, run.volume, exposure_ev);
+    let probes = spheres::draw(&tonemapped(&exact.image), view, camera, volume, exposure_ev);
     with_key(&probes, PROBE_KEY).write_png(&file("probes", "png"))?;
     if let Some(reference) = reference {
         reference.write_exr(&file("reference", "exr"))?;

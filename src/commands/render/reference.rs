@@ -7,8 +7,9 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 
-use super::Run;
 use crate::cli::RenderArgs;
+use crate::commands::session::Session;
+use crate::light::World;
 use crate::commands::tell;
 use crate::image::LayeredImage;
 use crate::math::blocks::BLOCK;
@@ -56,6 +57,15 @@ fn spp_of(image: &LayeredImage) -> Option<u32> {
     image.texts.get("spp")?.parse().ok()
 }
 
+/// A picture that is compared: what camera sees what of which scene.
+#[derive(Clone, Copy)]
+pub struct Shot<'a> {
+    pub session: &'a Session<'a>,
+    pub world: &'a World<'a>,
+    pub camera: &'a Camera,
+    pub view: &'a View,
+}
+
 /// The reference of one camera's picture.
 pub struct Reference {
     pub layers: ReferenceLayers,
@@ -64,65 +74,69 @@ pub struct Reference {
     pub summary: ReferenceSummary,
     /// Whether its surfaces are glossy, as those of probes are not.
     pub glossy: bool,
-    origin: Origin,
+    provenance: Provenance,
 }
 
-enum Origin {
+/// Where its layers come from.
+enum Provenance {
     Traced(Box<reference::Reference>, Identity),
     File(PathBuf),
 }
 
 impl Reference {
     /// The camera's reference, where one is wanted.
-    pub fn obtain(run: &Run, camera: &Camera, view: &View) -> Result<Option<Reference>> {
-        Ok(match &run.reference {
+    ///
+    /// # Errors
+    /// A file is of another picture; of another scene it may be where `allow_scene_change`.
+    pub fn obtain(source: Option<&Source>, shot: Shot, allow_scene_change: bool) -> Result<Option<Reference>> {
+        Ok(match source {
             None => None,
-            Some(Source::Trace { settings }) => Some(Reference::trace(run, camera, view, settings)?),
+            Some(Source::Trace { settings }) => Some(Reference::trace(shot, settings)?),
             Some(Source::File(file)) => {
                 let ReferenceFile { path, image, layers } = &**file;
-                check_file(run, camera, view, path, image)?;
+                check_file(shot, path, image, allow_scene_change)?;
                 let summary = ReferenceSummary { file: Some(path.display().to_string()), ..Default::default() };
                 let summary = ReferenceSummary { spp: spp_of(image), ..summary };
                 let glossy = image.texts.get("transport").is_some_and(|t| t == "gltf");
-                Some(Reference::new(run, view, layers.clone(), summary, glossy, Origin::File(path.clone())))
+                Some(Reference::new(shot, layers.clone(), summary, glossy, Provenance::File(path.clone())))
             }
         })
     }
 
-    fn trace(run: &Run, camera: &Camera, view: &View, settings: &ReferenceSettings) -> Result<Reference> {
+    fn trace(shot: Shot, settings: &ReferenceSettings) -> Result<Reference> {
+        let Shot { session: Session { console, .. }, world, camera, view } = shot;
         let (width, height) = (view.width, view.height);
         let started = Instant::now();
-        let traced = reference::trace(run.world, camera, width, height, settings, run.console.progress, None);
+        let traced = reference::trace(world, camera, width, height, settings, console.progress, None);
         let time_s = started.elapsed().as_secs_f64();
-        tell::traced(run.console, traced.spp, traced.rays, time_s);
+        tell::traced(console, traced.spp, traced.rays, time_s);
         if traced.non_finite > 0 {
-            run.console.warn(format!("{} samples of the reference were not finite and count as 0", traced.non_finite));
+            console.warn(format!("{} samples of the reference were not finite and count as 0", traced.non_finite));
         }
-        let identity = Identity::new(run.world, camera, width, height, settings);
+        let identity = Identity::new(world, camera, width, height, settings);
         let layers = ReferenceLayers::new(&traced.image, (width, height), Some(traced.spp / BLOCK))?;
         let summary = ReferenceSummary { spp: Some(traced.spp), time_s: Some(time_s), ..Default::default() };
-        Ok(Reference::new(run, view, layers, summary, false, Origin::Traced(Box::new(traced), identity)))
+        Ok(Reference::new(shot, layers, summary, false, Provenance::Traced(Box::new(traced), identity)))
     }
 
     fn new(
-        run: &Run,
-        view: &View,
+        shot: Shot,
         layers: ReferenceLayers,
         summary: ReferenceSummary,
         glossy: bool,
-        origin: Origin,
+        provenance: Provenance,
     ) -> Reference {
-        let regions = regions(run.world, view);
+        let regions = regions(shot.world, shot.view);
         let (irradiance_indirect_mean, standard_error_mean) = layers.means(|i| regions[i].is_some());
         let summary = ReferenceSummary { irradiance_indirect_mean, standard_error_mean, ..summary };
-        Reference { layers, regions, summary, glossy, origin }
+        Reference { layers, regions, summary, glossy, provenance }
     }
 
     /// Writes all that there is of the reference. A file is copied as it is, with what else it holds; onto itself it stays.
     pub fn write_exr(&self, path: &Path) -> Result<()> {
-        let source = match &self.origin {
-            Origin::Traced(traced, identity) => return Ok(traced.write(path, identity)?),
-            Origin::File(source) => source,
+        let source = match &self.provenance {
+            Provenance::Traced(traced, identity) => return Ok(traced.write(path, identity)?),
+            Provenance::File(source) => source,
         };
         if let (Ok(from), Ok(to)) = (source.canonicalize(), path.canonicalize())
             && from == to
@@ -136,12 +150,13 @@ impl Reference {
 }
 
 /// Refuses a file that says it is of another picture. Files of other programs do not say.
-fn check_file(run: &Run, camera: &Camera, view: &View, path: &Path, image: &LayeredImage) -> Result<()> {
-    let identity = Identity::new(run.world, camera, view.width, view.height, &ReferenceSettings::default());
+fn check_file(shot: Shot, path: &Path, image: &LayeredImage, allow_scene_change: bool) -> Result<()> {
+    let Shot { session, world, camera, view } = shot;
+    let identity = Identity::new(world, camera, view.width, view.height, &ReferenceSettings::default());
     let Some(what) = identity.other_picture(image) else { return Ok(()) };
     let message = format!("--reference-image: {} is of another {what} than the pictures", path.display());
-    if run.args.allow_scene_change && what.starts_with("scene") {
-        run.console.warn(message);
+    if allow_scene_change && what.starts_with("scene") {
+        session.console.warn(message);
         return Ok(());
     }
     bail!("{message}; make it anew with `lightprobe reference`, or give the arguments that it was made with")

@@ -2,16 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use super::SweepArgs;
-use crate::cli::EqualName;
+use crate::cli::{EqualName, SweepArgs};
+use crate::commands::session::Session;
 use crate::config::Config;
-use crate::report::header::Header;
 use crate::report::render::ReferenceSummary;
 use crate::report::sweep::{
     Aggregate, AxisValue, Cheapest, CheapestAt, ConfigurationReport, ERROR_FIGURE, FloorReport, Fronts, LadderReport,
     MethodFigures, OnFront, RunRecord, SCHEMA, SweepReport, SweepTimes,
 };
-use crate::scene::{Camera, Scene};
+use crate::scene::Camera;
 use crate::shade::methods::Method;
 use crate::shade::points::View;
 use crate::sweep::equal;
@@ -20,7 +19,7 @@ use crate::sweep::ladder::{Ladder, Rung};
 use crate::sweep::split::Split;
 
 /// A configuration after all its runs.
-pub struct Measured {
+pub struct Outcome {
     pub config: Config,
     pub report: ConfigurationReport,
 }
@@ -48,14 +47,14 @@ const FIGURES: &[(&str, Figure)] = &[
     ("error_flip", |_, m| m.error.flip),
 ];
 
-impl Measured {
+impl Outcome {
     pub fn new(
         ladder: usize,
         rung: &Rung,
         runs: Vec<RunRecord>,
         split: Split,
         reference_mean: Option<f64>,
-    ) -> Measured {
+    ) -> Outcome {
         let value = |figure: Figure| -> Vec<Option<f64>> {
             runs.iter().map(|run| figure(run, run.method(Method::On.name())?)).collect()
         };
@@ -77,7 +76,7 @@ impl Measured {
             on_front: OnFront::default(),
             runs,
         };
-        Measured { config: rung.config.clone(), report }
+        Outcome { config: rung.config.clone(), report }
     }
 
     /// NaN where it is undefined, which is on no front.
@@ -87,31 +86,31 @@ impl Measured {
 }
 
 /// Which of these are on the front of two figures.
-fn front(measured: &[Measured], which: &[usize], cost: &str, error: &str) -> Vec<usize> {
-    let points: Vec<(f64, f64)> = which.iter().map(|&i| (measured[i].mean(cost), measured[i].mean(error))).collect();
+fn front(outcomes: &[Outcome], which: &[usize], cost: &str, error: &str) -> Vec<usize> {
+    let points: Vec<(f64, f64)> = which.iter().map(|&i| (outcomes[i].mean(cost), outcomes[i].mean(error))).collect();
     which.iter().zip(pareto(&points)).filter(|(_, on)| *on).map(|(i, _)| *i).collect()
 }
 
-fn fronts(measured: &[Measured], which: &[usize]) -> Fronts {
+fn fronts(outcomes: &[Outcome], which: &[usize]) -> Fronts {
     Fronts {
-        bake_s: front(measured, which, "bake_s", "error_relative"),
-        bytes: front(measured, which, "bytes", "error_relative"),
-        shade_ms: front(measured, which, "shade_ms", "error_relative"),
-        leak_light: front(measured, which, "bytes", "leak_light"),
+        bake_s: front(outcomes, which, "bake_s", "error_relative"),
+        bytes: front(outcomes, which, "bytes", "error_relative"),
+        shade_ms: front(outcomes, which, "shade_ms", "error_relative"),
+        leak_light: front(outcomes, which, "bytes", "leak_light"),
     }
 }
 
 /// The curves.
-pub fn ladders(ladders: &[Ladder], measured: &[Measured]) -> Vec<LadderReport> {
+pub fn ladders(ladders: &[Ladder], outcomes: &[Outcome]) -> Vec<LadderReport> {
     let report = |(at, ladder): (usize, &Ladder)| {
-        let configurations: Vec<usize> = (0..measured.len()).filter(|&i| measured[i].report.ladder == at).collect();
-        let errors = configurations.iter().map(|&i| (i, measured[i].mean("error_relative")));
+        let configurations: Vec<usize> = (0..outcomes.len()).filter(|&i| outcomes[i].report.ladder == at).collect();
+        let errors = configurations.iter().map(|&i| (i, outcomes[i].mean("error_relative")));
         let best = errors.filter(|(_, e)| e.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i);
-        let of_bias = configurations.iter().map(|&i| &measured[i].report).filter(|c| c.ruled_by == Some("bias"));
+        let of_bias = configurations.iter().map(|&i| &outcomes[i].report).filter(|c| c.ruled_by == Some("bias"));
         LadderReport {
             name: ladder.name.clone(),
             method: ladder.method.clone(),
-            fronts: fronts(measured, &configurations),
+            fronts: fronts(outcomes, &configurations),
             best,
             floor_relative: of_bias.filter_map(|c| c.bias_relative).reduce(f64::min),
             configurations,
@@ -123,23 +122,22 @@ pub fn ladders(ladders: &[Ladder], measured: &[Measured]) -> Vec<LadderReport> {
 /// All that a report is made of.
 pub struct Parts<'a> {
     pub args: &'a SweepArgs,
-    pub threads: usize,
+    pub session: &'a Session<'a>,
     pub camera: &'a Camera,
     pub view: &'a View,
-    pub scene: &'a Scene,
     pub reference: ReferenceSummary,
     pub exposure_ev: f32,
     pub times: SweepTimes,
     pub ladders: Vec<LadderReport>,
-    pub measured: Vec<Measured>,
+    pub outcomes: Vec<Outcome>,
     pub floor: Vec<FloorReport>,
 }
 
 pub fn report(parts: Parts) -> SweepReport {
-    let Parts { args, mut measured, ladders, .. } = parts;
-    let all: Vec<usize> = (0..measured.len()).collect();
-    let whole = fronts(&measured, &all);
-    for (i, m) in measured.iter_mut().enumerate() {
+    let Parts { args, mut outcomes, ladders, .. } = parts;
+    let all: Vec<usize> = (0..outcomes.len()).collect();
+    let whole = fronts(&outcomes, &all);
+    for (i, m) in outcomes.iter_mut().enumerate() {
         m.report.on_front = OnFront {
             bake_s: whole.bake_s.contains(&i),
             bytes: whole.bytes.contains(&i),
@@ -147,26 +145,26 @@ pub fn report(parts: Parts) -> SweepReport {
             leak_light: whole.leak_light.contains(&i),
         };
     }
-    let errors: Vec<f64> = measured.iter().map(|m| m.mean("error_relative")).collect();
+    let errors: Vec<f64> = outcomes.iter().map(|m| m.mean("error_relative")).collect();
     let cheapest_by = |cost: &str| -> Vec<CheapestAt> {
-        let points: Vec<(f64, f64)> = measured.iter().map(|m| (m.mean(cost), m.mean("error_relative"))).collect();
+        let points: Vec<(f64, f64)> = outcomes.iter().map(|m| (m.mean(cost), m.mean("error_relative"))).collect();
         let at = |level: f64| {
             let i = cheapest(&points, level)?;
-            let label = measured[i].report.label.clone();
+            let label = outcomes[i].report.label.clone();
             Some(CheapestAt { error_relative: level, configuration: i, label, cost: points[i].0 })
         };
         levels(&errors).into_iter().filter_map(at).collect()
     };
     let cheapest = Cheapest { bake_s: cheapest_by("bake_s"), bytes: cheapest_by("bytes") };
-    let config = measured.first().map(|m| m.report.config.clone()).unwrap_or_default();
-    let configurations: Vec<ConfigurationReport> = measured.into_iter().map(|m| m.report).collect();
+    let config = outcomes.first().map(|m| m.report.config.clone()).unwrap_or_default();
+    let configurations: Vec<ConfigurationReport> = outcomes.into_iter().map(|m| m.report).collect();
     let equal = args.equal.map(|held| match held {
         EqualName::Positions => equal::positions(&ladders, &configurations),
         EqualName::Bytes => equal::bytes(&ladders, &configurations),
     });
     let seed = args.trace.seed;
     SweepReport {
-        header: Header::new(SCHEMA, "sweep", seed, parts.threads, &parts.scene.blake3, config),
+        header: parts.session.header(SCHEMA, "sweep", config),
         camera: parts.camera.name.clone(),
         width: parts.view.width,
         height: parts.view.height,

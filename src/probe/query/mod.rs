@@ -44,6 +44,15 @@ pub enum Visibility {
     Exact(u8),
 }
 
+/// [`Visibility`] of many points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BatchVisibility<'m> {
+    Off,
+    Stored,
+    /// A mask for every point.
+    Exact(&'m [u8]),
+}
+
 /// The eight probes of a point, in the order of [`super::Grid::corner`], with their weights, not normalised.
 #[derive(Debug, Clone, Copy)]
 pub struct CornerWeights {
@@ -162,17 +171,33 @@ impl Query<'_> {
         self.blend(&self.weights(point, visibility), oct_from_direction(point.normal))
     }
 
-    /// Irradiance at many points, with the stored visibility or with none: the settings are looked at once for all.
+    /// Irradiance at many points: the settings are looked at once for all.
     ///
     /// # Panics
-    /// When `out` is not as long as `points`.
-    pub fn batch(&self, points: &[QueryPoint], visibility: Visibility, out: &mut [Vec3]) {
+    /// When `out`, or the masks, are not as many as the points.
+    pub fn batch(&self, points: &[QueryPoint], visibility: BatchVisibility, out: &mut [Vec3]) {
         assert_eq!(points.len(), out.len(), "a result for every point");
+        let visibility = match visibility {
+            BatchVisibility::Exact(masks) => {
+                assert_eq!(points.len(), masks.len(), "a mask for every point");
+                for ((point, &mask), out) in points.iter().zip(masks).zip(out) {
+                    *out = self.asked(point, &Mask(mask));
+                }
+                return;
+            }
+            BatchVisibility::Off => Visibility::Off,
+            BatchVisibility::Stored => Visibility::Stored,
+        };
         with_test!(self, visibility, |test| {
             for (point, out) in points.iter().zip(out) {
-                *out = self.blend(&self.weigh(point, &test), oct_from_direction(point.normal));
+                *out = self.asked(point, &test);
             }
         });
+    }
+
+    #[inline]
+    fn asked(&self, point: &QueryPoint, test: &impl CornerTest) -> Vec3 {
+        self.blend(&self.weigh(point, test), oct_from_direction(point.normal))
     }
 
     /// Weighted mean of the probes' irradiance around the direction `oct`.

@@ -83,7 +83,16 @@ impl IrradianceCurve {
     }
 }
 
-/// Bytes of a texel in memory while a sweep runs: four floats, and four of the sweep's result.
+/// How finely irradiance is stored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fineness {
+    /// Largest relative error of rounding.
+    pub rounding: f64,
+    /// Interior texels along a side of the map.
+    pub resolution: usize,
+}
+
+/// Bytes of a texel in memory while an iteration runs: four floats, and four of its result.
 const TEXEL_BYTES: u64 = 2 * size_of::<Vec3A>() as u64;
 /// Bytes of a texel on its way into the file, beside its code: three floats.
 const PLAIN_TEXEL_BYTES: u64 = 12;
@@ -113,6 +122,11 @@ impl IrradianceStore {
         let IrradianceStore::Octahedral(store) = self;
         let encoded = TEXEL_BYTES / 2 + PLAIN_TEXEL_BYTES + store.format.bytes_per_texel() as u64;
         ((store.resolution + 2 * border) as u64).pow(2) * TEXEL_BYTES.max(encoded)
+    }
+
+    pub fn fineness(&self) -> Fineness {
+        let IrradianceStore::Octahedral(store) = self;
+        Fineness { rounding: store.format.rounding(), resolution: store.resolution }
     }
 
     /// The key that makes it larger, with how large it is beside its default.
@@ -248,6 +262,11 @@ impl Irradiance {
     pub fn runtime_bytes(&self) -> usize {
         let Irradiance::Maps { maps, format, .. } = self;
         maps.texels_per_probe() * format.bytes_per_texel()
+    }
+
+    pub fn fineness(&self) -> Fineness {
+        let Irradiance::Maps { maps, format, .. } = self;
+        Fineness { rounding: format.rounding(), resolution: maps.resolution }
     }
 
     /// Curve, and number format with the power of two that it is scaled by, in words.

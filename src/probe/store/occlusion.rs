@@ -235,6 +235,22 @@ impl Occlusion {
         Some((squares / a.len() as f64).sqrt())
     }
 
+    /// How much it can tell, for comparisons: 0 nothing, 1 distances, 2 visibility at surfaces.
+    pub fn rank(&self) -> u32 {
+        match self {
+            Occlusion::None => 0,
+            Occlusion::Moments(_) => 1,
+            Occlusion::Surface(_) => 2,
+        }
+    }
+
+    /// Mean number of probes that a surface sees, of the eight around it; `None` where that is not stored.
+    pub fn mean_visible(&self) -> Option<f64> {
+        let Occlusion::Surface(table) = self else { return None };
+        let bits: u64 = table.masks.iter().map(|mask| u64::from(mask.count_ones())).sum();
+        Some(bits as f64 / table.masks.len().max(1) as f64)
+    }
+
     /// Name and size in words.
     pub fn describe(&self) -> Cow<'static, str> {
         match self {

@@ -173,5 +173,5 @@ pub(super) fn scenes(item: &str, base: &Value, candidate: &Value) -> Option<Find
 pub(super) fn storage(item: &str, reports: [&Value; 2]) -> Vec<Finding> {
     let [a, b] = reports.map(|v| v["config"].as_str().and_then(|text| Config::parse(text, "").ok()));
     let (Some(a), Some(b)) = (a, b) else { return Vec::new() };
-    storage::storage(item, [a, b].map(|c| (c.encoding.irradiance, c.encoding.border, c.filter.irradiance_resolution)))
+    storage::storage(item, [a, b].map(|c| (c.store.irradiance.fineness(), c.store.border)))
 }

@@ -45,7 +45,7 @@ use self::shown::Shown;
 use self::sides::{Item, Side};
 use self::thresholds::Thresholds;
 use crate::image::{ImageError, Picture8};
-use crate::probe::file::container::FileError;
+use crate::probe::container::FileError;
 use crate::report::page::PageError;
 use crate::system::memory::TooLittleMemory;
 

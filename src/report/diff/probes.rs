@@ -130,12 +130,12 @@ pub fn compare(
 /// Probes of the same grid point, base and candidate.
 fn matches(base: &Volume, candidate: &Volume) -> Vec<(ProbeIndex, ProbeIndex)> {
     let (grid, other) = (&base.grid, &candidate.grid);
-    let spacing = grid.spacing.as_dvec3();
+    let spacing = grid.spacing().as_dvec3();
     // Grid points of the candidate in steps of the base's grid.
     let mut points: HashMap<IVec3, ProbeIndex> = HashMap::new();
     for index in (0..other.probe_count() as u32).map(ProbeIndex) {
-        let world = other.origin_world + other.coordinate(index).as_dvec3() * other.spacing.as_dvec3();
-        let step = (world - grid.origin_world) / spacing;
+        let world = other.origin_world() + other.coordinate(index).as_dvec3() * other.spacing().as_dvec3();
+        let step = (world - grid.origin_world()) / spacing;
         if (step - step.round()).abs().max_element() <= SAME_POINT {
             points.insert(step.round().as_ivec3(), index);
         }
@@ -164,7 +164,7 @@ fn row(base: &Volume, candidate: &Volume, (a, b): (ProbeIndex, ProbeIndex), dire
         squares += f64::from((e[1] - e[0]).length_squared());
     }
     let n = directions.len() as f64;
-    let world = |volume: &Volume, probe| volume.grid.origin_world + volume.position(probe).as_dvec3();
+    let world = |volume: &Volume, probe| volume.grid.origin_world() + volume.position(probe).as_dvec3();
     let position = world(base, a);
     ProbeRow {
         index: i,
@@ -177,18 +177,8 @@ fn row(base: &Volume, candidate: &Volume, (a, b): (ProbeIndex, ProbeIndex), dire
         irradiance_candidate: sums[1] / n,
         irradiance_difference: (squares / (3.0 * n)).sqrt(),
         irradiance_difference_relative: 0.0,
-        distance_difference_m: distance_difference(base, candidate, i, j),
+        distance_difference_m: base.occlusion.distance_difference(i, &candidate.occlusion, j),
     }
-}
-
-fn distance_difference(base: &Volume, candidate: &Volume, i: usize, j: usize) -> Option<f64> {
-    let (a, b) = (base.distance.as_ref()?, candidate.distance.as_ref()?);
-    if (a.resolution, a.border) != (b.resolution, b.border) {
-        return None;
-    }
-    let (a, b) = (a.probe(i), b.probe(j));
-    let squares: f64 = a.iter().zip(b).map(|(a, b)| f64::from(a.x - b.x).powi(2)).sum();
-    Some((squares / a.len() as f64).sqrt())
 }
 
 fn compare_files(item: &str, base_file: &ProbeFile, candidate_file: &ProbeFile) -> (ProbesReport, Vec<Finding>) {
@@ -196,7 +186,7 @@ fn compare_files(item: &str, base_file: &ProbeFile, candidate_file: &ProbeFile) 
     let pairs = matches(base, candidate);
     let directions = directions();
     let mut rows: Vec<ProbeRow> = pairs.par_iter().map(|&pair| row(base, candidate, pair, &directions)).collect();
-    let spacing = base.grid.spacing.max_element();
+    let spacing = base.grid.spacing_max();
     let active = |row: &ProbeRow| row.state_base == ProbeState::Active && row.state_candidate == ProbeState::Active;
     let moved = rows.iter().filter(|r| active(r) && r.moved_m > f64::from(MOVED_SHARE * spacing)).count();
     let is_active = |state| state == ProbeState::Active;
@@ -270,7 +260,7 @@ fn compare_files(item: &str, base_file: &ProbeFile, candidate_file: &ProbeFile) 
 /// The block of the volume that a probe of the base lies in.
 fn block(volume: &Volume, row: &ProbeRow) -> usize {
     let coordinate = volume.grid.coordinate(ProbeIndex(row.index as u32));
-    let cell = coordinate * UVec3::splat(BLOCKS) / volume.grid.divisions;
+    let cell = coordinate * UVec3::splat(BLOCKS) / volume.grid.divisions();
     (cell.x + BLOCKS * (cell.y + BLOCKS * cell.z)) as usize
 }
 
@@ -379,7 +369,7 @@ fn worst_region(volume: &Volume, rows: &[ProbeRow], scale: f64, noise: Noise) ->
 fn distances(item: &str, volume: &Volume, rows: &[ProbeRow]) -> Vec<Finding> {
     let found: Option<Vec<f64>> = rows.iter().map(|r| r.distance_difference_m).collect();
     let Some(found) = found.filter(|found| !found.is_empty()) else { return Vec::new() };
-    let percent = 100.0 * mean_square(found.into_iter()).sqrt() / f64::from(volume.grid.spacing.max_element());
+    let percent = 100.0 * mean_square(found.into_iter()).sqrt() / f64::from(volume.grid.spacing_max());
     vec![Finding::percentage(
         "probes.distance",
         item,

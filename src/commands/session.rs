@@ -1,0 +1,151 @@
+//! What every command on a scene does first: check what it will write, bind its threads, load, say what was loaded.
+
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::Result;
+use serde::Serialize;
+
+use super::{Console, tell};
+use crate::cli::{ConfigArgs, TraceArgs};
+use crate::config::{Config, Layers};
+use crate::light::World;
+use crate::probe::file::{LightRecord, SceneRecord};
+use crate::report::header::Header;
+use crate::scene::{self, EnvironmentSource, LoadOptions, Scene};
+use crate::system::output::{Named, check_apart, check_outputs};
+
+/// What a session is opened with.
+pub struct Opening<'a> {
+    pub scene: &'a Path,
+    pub trace: &'a TraceArgs,
+    /// The light that the configuration, or the probe file, gives the scene.
+    pub light: LightRecord,
+    /// Whether images whose texels are all equal are kept whole.
+    pub keep_images: bool,
+    /// Files that the command reads besides the scene and its sky.
+    pub inputs: Vec<Named>,
+    /// Files that it will write.
+    pub outputs: Vec<Named>,
+}
+
+/// A loaded scene and the circumstances of the command that works on it.
+pub struct Session<'c> {
+    pub console: &'c Console,
+    pub scene: Scene,
+    pub light: LightRecord,
+    pub seed: u64,
+    pub threads: usize,
+    pub started: Instant,
+    pub load_s: f64,
+}
+
+impl<'c> Session<'c> {
+    /// Checks, binds threads and loads. Nothing is traced, nothing written.
+    ///
+    /// # Errors
+    /// An output cannot be written, or is an input; the scene cannot be loaded.
+    pub fn open(opening: Opening, console: &'c Console) -> Result<Session<'c>> {
+        let Opening { scene: path, trace, light, .. } = opening;
+        check_outputs(&opening.outputs, &inputs(path, trace, opening.inputs))?;
+        let threads = set_threads(trace.threads)?;
+        let started = Instant::now();
+        let from_light = light.sky.map(|sky| EnvironmentSource::Constant(sky.into()));
+        let environment = trace.env.clone().or(from_light);
+        let options = LoadOptions { environment, collapse_constant_images: !opening.keep_images, ..Default::default() };
+        let scene = scene::load(path, &options)?;
+        for warning in &scene.warnings {
+            console.warn(format!("{}: {warning}", path.display()));
+        }
+        let load_s = started.elapsed().as_secs_f64();
+        let session = Session { console, scene, light, seed: trace.seed, threads, started, load_s };
+        session.check_apart(&opening.outputs)?;
+        tell::scene(console, path, &session.scene, load_s);
+        Ok(session)
+    }
+
+    /// Refuses outputs that are files of the scene: its buffers and images.
+    pub fn check_apart(&self, outputs: &[Named]) -> Result<()> {
+        let file = |file| Named::new("a file of the scene", file);
+        let files: Vec<Named> = self.scene.files.iter().map(file).collect();
+        Ok(check_apart(outputs, &files)?)
+    }
+
+    /// The scene with what asks about its light, and the seconds that this took to build.
+    ///
+    /// # Errors
+    /// Embree refuses the scene.
+    pub fn world(&self) -> Result<(World<'_>, f64)> {
+        let started = Instant::now();
+        let world = World::new(&self.scene, self.light.punctual_scale, self.light.albedo_max)?;
+        let seconds = started.elapsed().as_secs_f64();
+        tell::accel(self.console, seconds);
+        Ok((world, seconds))
+    }
+
+    /// Seconds since the session was opened.
+    pub fn elapsed_s(&self) -> f64 {
+        self.started.elapsed().as_secs_f64()
+    }
+
+    pub fn scene_record(&self) -> SceneRecord {
+        SceneRecord { name: self.scene.name.clone(), blake3: self.scene.blake3.clone() }
+    }
+
+    /// What a report begins with; `config` is the configuration in effect, RON.
+    pub fn header(&self, schema: &'static str, command: &'static str, config: String) -> Header {
+        Header::new(schema, command, self.seed, self.threads, &self.scene.blake3, config)
+    }
+
+    /// Prints a report as JSON where that was asked for, else what `text` makes of it.
+    pub fn print(&self, report: &impl Serialize, text: impl FnOnce() -> String) -> Result<()> {
+        match self.console.json {
+            true => self.console.print(&serde_json::to_string_pretty(report)?),
+            false => self.console.print(&text()),
+        }
+    }
+}
+
+/// Binds the work to this many threads; 0 means one per core.
+fn set_threads(threads: usize) -> Result<usize> {
+    /// More than any machine has; guards against typing errors that would exhaust memory.
+    const MOST: usize = 1024;
+    anyhow::ensure!(threads <= MOST, "--threads {threads}: at most {MOST} make sense; use 0 for one per core");
+    // Fails only when a pool stands already, as when commands run twice in one process.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    Ok(rayon::current_num_threads())
+}
+
+/// What a command reads, for the checks of its outputs.
+pub fn inputs(scene: &Path, trace: &TraceArgs, others: impl IntoIterator<Item = Named>) -> Vec<Named> {
+    let mut inputs = vec![Named::new("the scene", scene)];
+    if let Some(EnvironmentSource::File(map)) = &trace.env {
+        inputs.push(Named::new("the environment map", map));
+    }
+    inputs.extend(others);
+    inputs
+}
+
+/// Defaults, then preset, then file, then `--set`, then a constant `--env`, which a probe file so carries to `render`.
+pub fn resolve_config(args: &ConfigArgs, trace: &TraceArgs) -> Result<Config> {
+    let mut layers = Layers::default();
+    if let Some(name) = &args.preset {
+        layers = layers.preset(name)?;
+    }
+    if let Some(path) = &args.config {
+        layers = layers.file(path)?;
+    }
+    let mut config = layers.set(&args.set)?.config()?;
+    set_sky(&mut config, trace);
+    Ok(config)
+}
+
+/// A constant `--env` in place of the configured sky.
+pub fn set_sky(config: &mut Config, trace: &TraceArgs) {
+    match &trace.env {
+        Some(EnvironmentSource::Constant(sky)) => config.lights.sky = Some((*sky).into()),
+        // A map replaces the configured sky; its path has no place in the file.
+        Some(EnvironmentSource::File(_)) => config.lights.sky = None,
+        None => {}
+    }
+}

@@ -1,0 +1,93 @@
+//! Which configurations a sweep compares, and whether they can be.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, bail};
+
+use crate::bake::{self, Circumstances};
+use crate::cli::{EqualName, SweepArgs};
+use crate::commands::session::set_sky;
+use crate::config::{Config, PlanMode, presets};
+use crate::light::World;
+use crate::scene::Scene;
+use crate::sweep::ladder::{Ladder, LadderFile, Method, check_shared, expand};
+use crate::sweep::{SweepError, equal};
+use crate::system::output::Named;
+
+/// All configurations, in the order in which they run.
+pub fn ladders(args: &SweepArgs, file: Option<&LadderFile>) -> Result<Vec<Ladder>> {
+    let mut ladders = expand(file, &methods(args, file)?, &args.set, |config| set_sky(config, &args.trace))?;
+    if args.equal == Some(EqualName::Positions) {
+        equal::share_positions(&mut ladders);
+    }
+    check_shared(&ladders)?;
+    Ok(ladders)
+}
+
+/// The methods that the command line names; the default where neither it nor all ladders name any. Files lie over every
+/// preset; without presets each is a method of its own.
+fn methods(args: &SweepArgs, file: Option<&LadderFile>) -> Result<Vec<Method>> {
+    let mut methods: Vec<Method> = Vec::new();
+    let all = presets::PRESETS.iter().map(|preset| preset.name);
+    for name in &args.preset {
+        let named: Vec<&str> = if name == "all" { all.clone().collect() } else { vec![name] };
+        for name in named {
+            methods.push(Method::new(Some(name), &args.config)?);
+        }
+    }
+    if args.preset.is_empty() {
+        for path in &args.config {
+            methods.push(Method::new(None, std::slice::from_ref(path))?);
+        }
+    }
+    for (i, method) in methods.iter().enumerate() {
+        if methods[..i].iter().any(|other| other.name == method.name) {
+            bail!("two configurations are called '{}'; rename a file, or give each preset once", method.name);
+        }
+    }
+    if methods.is_empty() && file.is_none_or(LadderFile::wants_methods) {
+        methods.push(Method::new(None, &[])?);
+    }
+    if !methods.is_empty() && file.is_some_and(|file| !file.wants_methods()) {
+        bail!("--preset, --config: every ladder of the file has a configuration of its own; leave them out");
+    }
+    Ok(methods)
+}
+
+/// Files that configurations come from.
+pub fn configurations(args: &SweepArgs, file: Option<&LadderFile>) -> Vec<Named> {
+    let named = |path: &PathBuf| Named::new("a configuration", path);
+    let of_ladders = file.map(LadderFile::files).unwrap_or_default();
+    let ladder = args.ladder.iter().map(|path| Named::new("the ladder", path));
+    args.config.iter().chain(&of_ladders).map(named).chain(ladder).collect()
+}
+
+/// What loading a scene asks of the configurations: their light, which is the same, and whether any keeps all images.
+pub fn shared(ladders: &[Ladder]) -> Result<(&Config, bool)> {
+    let configs = || ladders.iter().flat_map(|ladder| &ladder.rungs).map(|rung| &rung.config);
+    let first = configs().next().context("there is no configuration to run")?;
+    Ok((first, configs().any(|config| config.plan.mode == PlanMode::KeepEverything)))
+}
+
+/// Refuses what cannot be baked, before anything is traced.
+pub fn check_all(ladders: &[Ladder], scene: &Scene) -> Result<(), SweepError> {
+    for rung in ladders.iter().flat_map(|ladder| &ladder.rungs) {
+        let named = |cause| SweepError::Bake { label: rung.label.clone(), cause };
+        bake::check(&rung.config, scene).map_err(named)?;
+    }
+    Ok(())
+}
+
+/// Refuses what may not fit and, looked at closer, does not.
+pub fn check_captures(ladders: &[Ladder], world: &World, seed: u64) -> Result<(), SweepError> {
+    let circumstances = Circumstances::quiet(seed);
+    for rung in ladders.iter().flat_map(|ladder| &ladder.rungs) {
+        let named = |cause| SweepError::Bake { label: rung.label.clone(), cause };
+        if bake::surely_fits(&rung.config, world.scene).map_err(named)? {
+            continue;
+        }
+        let prepared = bake::prepare(world, &rung.config, &circumstances).map_err(named)?;
+        prepared.check_memory(&circumstances).map_err(|cause| named(cause.into()))?;
+    }
+    Ok(())
+}

@@ -157,7 +157,8 @@ impl Prepared<'_, '_> {
         let trace = |probe: usize| self.trace(&capture, probe);
         let (captures, occlusion) = gather(&self, &trace, circumstances, &mut log);
         // What neither bounces nor shading ask for is only stored.
-        let (asked, unasked) = if self.plan.visibility { (occlusion, None) } else { (Occlusion::None, Some(occlusion)) };
+        let (asked, unasked) =
+            if self.plan.visibility { (occlusion, None) } else { (Occlusion::None, Some(occlusion)) };
         let mut volume = self.volume(asked);
         let solution = self.transport(&captures, &mut volume, circumstances, scene, &mut log)?;
         let mut plan = self.plan.clone();
@@ -182,10 +183,8 @@ impl Prepared<'_, '_> {
         log: &mut Log,
     ) -> Result<Solution, BakeError> {
         let config = self.config;
-        let kernel = log.time(
-            |times| &mut times.filter,
-            || volume.irradiance.kernel(&config.capture.rays.directions()),
-        );
+        let kernel =
+            log.time(|times| &mut times.filter, || volume.irradiance.kernel(&config.capture.rays.directions()));
         let operator = Operator {
             captures,
             kernel: &kernel,

@@ -75,7 +75,8 @@ impl Prepared<'_, '_> {
         // Light that is lost at every bounce: what is not reflected, and what leaves the scene.
         let seen: usize = traced.iter().map(|c| c.texels).sum();
         let reflected: Vec3A = traced.iter().flat_map(|c| &c.surfels).map(|s| Vec3A::from(s.albedo())).sum();
-        let ratio = f64::from((reflected / seen.max(1) as f32).max_element()).min(f64::from(config.materials.albedo_max));
+        let ratio =
+            f64::from((reflected / seen.max(1) as f32).max_element()).min(f64::from(config.materials.albedo_max));
 
         let mut stored: Vec<Option<ProbeCapture>> = (0..self.grid.probe_count()).map(|_| None).collect();
         pilot.iter().zip(traced).for_each(|(&probe, capture)| stored[probe] = Some(capture));

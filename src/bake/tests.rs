@@ -5,8 +5,10 @@ use nalgebra::{DMatrix, DVector};
 use serde_json::json;
 
 use super::*;
+use crate::probe::store::kernel::Kernel;
+use crate::probe::transport::BounceSettings;
 use crate::probe::transport::operator::{self, Field};
-use crate::probe::transport::solver::SolverSettings;
+use crate::probe::transport::solver;
 use crate::scene::{self, LoadOptions, Scene};
 
 #[path = "../../tests/common/mod.rs"]
@@ -17,8 +19,8 @@ fn bake(checkpoint: Option<Checkpoint>) -> Baked {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/two_rooms_open.glb");
     let scene = scene::load(&path, &LoadOptions::default()).unwrap();
     let config = Config::default().with_overrides(&["grid.spacing_m=2".to_owned()]).unwrap();
-    let world = World::new(&scene, config.lights.punctual_scale, config.solver.albedo_max).unwrap();
-    let circumstances = Circumstances { seed: 1, memory_budget_bytes: None, progress: Progress::hidden(), checkpoint };
+    let world = World::new(&scene, config.lights.punctual_scale, config.materials.albedo_max).unwrap();
+    let circumstances = Circumstances { checkpoint, ..Circumstances::quiet(1) };
     let record = SceneRecord { name: scene.name.clone(), blake3: scene.blake3.clone() };
     prepare(&world, &config, &circumstances).unwrap().bake(&circumstances, &record).unwrap()
 }
@@ -30,16 +32,16 @@ fn a_resumed_bake_gives_the_same_bytes() {
     let checkpoint = |resume| Checkpoint { path: path.clone(), resume, interval: Duration::ZERO };
     let whole = bake(None);
     assert!(!path.exists());
-    // With an interval of zero every sweep is saved; the last stands.
+    // With an interval of zero every iteration is saved; the last stands.
     bake(Some(checkpoint(false)));
     let saved = std::fs::read(&path).unwrap();
     let resumed = bake(Some(checkpoint(true)));
-    assert_eq!(std::fs::read(&path).unwrap(), saved, "nothing was left to sweep");
+    assert_eq!(std::fs::read(&path).unwrap(), saved, "nothing was left to iterate");
     assert_eq!(resumed.container, whole.container);
     assert_eq!(resumed.solution, whole.solution);
 }
 
-/// A small bake up to the sweeps.
+/// A small bake up to the iterations.
 struct Traced<'w, 's> {
     prepared: Prepared<'w, 's>,
     captures: Vec<ProbeCapture>,
@@ -48,24 +50,22 @@ struct Traced<'w, 's> {
 
 impl<'w, 's> Traced<'w, 's> {
     fn new(world: &'w World<'s>, config: &'w Config) -> Traced<'w, 's> {
-        let circumstances =
-            Circumstances { seed: 1, memory_budget_bytes: None, progress: Progress::hidden(), checkpoint: None };
+        let circumstances = Circumstances::quiet(1);
         let prepared = prepare(world, config, &circumstances).unwrap();
         let capture = prepared.capture(&circumstances);
         let captures = (0..prepared.grid.probe_count()).map(|p| prepared.trace(&capture, p)).collect();
-        let kernel = Kernel::cosine(config.capture.resolution, config.filter.irradiance_resolution);
+        let irradiance = prepared.volume(Occlusion::None).irradiance;
+        let kernel = irradiance.kernel(&config.capture.rays.directions());
         Traced { prepared, captures, kernel }
     }
 
-    fn sweep<'a>(&'a self, captures: &'a Vec<ProbeCapture>) -> Sweep<'a, Vec<ProbeCapture>> {
-        Sweep { captures, kernel: &self.kernel, query: &self.prepared.config.query, gathers_emission: true }
+    fn operator<'a>(&'a self, captures: &'a Vec<ProbeCapture>) -> Operator<'a, Vec<ProbeCapture>> {
+        Operator { captures, kernel: &self.kernel, query: &self.prepared.config.query, gathers_emission: true }
     }
 
     fn volume(&self) -> Volume {
-        let (filter, encoding) = (&self.prepared.config.filter, &self.prepared.config.encoding);
-        let probes = self.prepared.grid.probe_count();
-        self.prepared
-            .volume(OctahedralMaps::new(probes, filter.irradiance_resolution, encoding.border, Vec3A::ZERO), None)
+        let survey = self.prepared.placement.survey.clone().filter(|_| self.prepared.plan.visibility);
+        self.prepared.volume(survey.map_or(Occlusion::None, Occlusion::Surface))
     }
 }
 
@@ -79,26 +79,27 @@ fn config(set: &[&str]) -> Config {
 }
 
 #[test]
-fn sweeps_go_on_from_a_checkpoint_as_if_nothing_had_happened() {
+fn iterations_go_on_from_a_checkpoint_as_if_nothing_had_happened() {
     let scene = rooms_with_a_door(0.99);
     let config = config(&["grid.divisions=(6,3,3)"]);
     let world = World::new(&scene, 1.0, 0.999).unwrap();
     let traced = Traced::new(&world, &config);
-    let sweep = traced.sweep(&traced.captures);
+    let operator = traced.operator(&traced.captures);
     let folder = tempfile::tempdir().unwrap();
-    let path = |sweeps: usize| folder.path().join(sweeps.to_string());
+    let path = |iterations: usize| folder.path().join(iterations.to_string());
     let mut whole = traced.volume();
-    let solution = solver::solve(&sweep, &config.solver, &mut whole, State::default(), |state, volume| {
-        checkpoint::write(&path(state.solution.bounces.len()), "this bake", state, volume).unwrap();
-    });
+    let solution =
+        solver::solve(&operator, &config.transport.iteration(), &mut whole, Iterations::default(), |state, volume| {
+            checkpoint::write(&path(state.solution.bounces.len()), "this bake", state, volume).unwrap();
+        });
     let done = solution.bounces.len();
     assert!(solution.converged && solution.bounces.iter().filter(|b| b.accelerated).count() > 3, "{solution:?}");
-    // In the plain sweeps, among the accelerated ones, at the end.
-    for sweeps in [1, 2, done / 2, done - 1, done] {
+    // In the plain iterations, among the accelerated ones, at the end.
+    for iterations in [1, 2, done / 2, done - 1, done] {
         let mut volume = traced.volume();
-        let state = checkpoint::read(&path(sweeps), "this bake", &mut volume).unwrap();
-        assert_eq!(solver::solve(&sweep, &config.solver, &mut volume, state, |_, _| {}), solution);
-        assert_eq!(volume.irradiance, whole.irradiance, "from sweep {sweeps}");
+        let state = checkpoint::read(&path(iterations), "this bake", &mut volume).unwrap();
+        assert_eq!(solver::solve(&operator, &config.transport.iteration(), &mut volume, state, |_, _| {}), solution);
+        assert_eq!(volume.irradiance, whole.irradiance, "from iteration {iterations}");
     }
 }
 
@@ -110,8 +111,8 @@ fn dense(traced: &Traced) -> (DMatrix<f64>, DVector<f64>) {
         capture.surfels.iter_mut().for_each(|s| s.direct_radiance = Vec3::ZERO);
     }
     let mut volume = traced.volume();
-    let (operator, masks) = (traced.sweep(&dark), traced.sweep(&dark).masks(&volume));
-    let (direct, _) = traced.sweep(&traced.captures).apply(&volume, None);
+    let (operator, masks) = (traced.operator(&dark), traced.operator(&dark).masks(&volume));
+    let (direct, _) = traced.operator(&traced.captures).apply(&volume, None);
     let n = direct.len();
     let mut matrix = DMatrix::zeros(n, n);
     for column in 0..n {
@@ -135,7 +136,7 @@ fn largest_eigenvalue(one_minus: &nalgebra::LU<f64, nalgebra::Dyn, nalgebra::Dyn
     1.0 - 1.0 / growth
 }
 
-/// The accelerated solver against the dense solution: at most 30 sweeps, every texel within 1 % of it, 1 − λ̂ within 10 %.
+/// The accelerated solver against the dense solution: at most 30 iterations, every texel within 1 % of it, 1 − λ̂ within 10 %.
 fn check_against_dense(scene: &Scene, config: &Config, what: &str) {
     let world = World::new(scene, 1.0, 0.9995).unwrap();
     let traced = Traced::new(&world, config);
@@ -145,20 +146,20 @@ fn check_against_dense(scene: &Scene, config: &Config, what: &str) {
     let exact = one_minus.solve(&direct).unwrap();
     let eigenvalue = largest_eigenvalue(&one_minus, n);
     let mut volume = traced.volume();
-    let sweep = traced.sweep(&traced.captures);
-    let settings = SolverSettings { max_sweeps: 29, ..config.solver.clone() };
-    let solution = solver::solve(&sweep, &settings, &mut volume, State::default(), |_, _| {});
+    let operator = traced.operator(&traced.captures);
+    let settings = BounceSettings { max_iterations: 30, ..config.transport.iteration() };
+    let solution = solver::solve(&operator, &settings, &mut volume, Iterations::default(), |_, _| {});
     let found = operator::field_of(&volume);
     let worst = found.iter().zip(exact.iter()).map(|(e, x)| (f64::from(e.x) / x - 1.0).abs()).fold(0.0, f64::max);
     let estimate = solution.spectral_radius_estimate.unwrap();
     let gap = (1.0 - estimate) / (1.0 - eigenvalue);
     println!(
-        "{what}: {n} unknowns, {} sweeps, worst texel {worst:.1e}, 1 − λ {:.3e}, estimate ÷ truth {gap:.4}, bound {:.1e}",
+        "{what}: {n} unknowns, {} iterations, worst texel {worst:.1e}, 1 − λ {:.3e}, estimate ÷ truth {gap:.4}, bound {:.1e}",
         solution.bounces.len(),
         1.0 - eigenvalue,
         solution.error_bound_relative.unwrap(),
     );
-    assert!(solution.bounces.len() <= 30 && worst <= 0.01, "{what}: {} sweeps, {worst}", solution.bounces.len());
+    assert!(solution.bounces.len() <= 30 && worst <= 0.01, "{what}: {} iterations, {worst}", solution.bounces.len());
     assert!((gap - 1.0).abs() <= 0.1, "{what}: 1 − λ {} instead of {}", 1.0 - estimate, 1.0 - eigenvalue);
     // The bound holds: relative to the largest texel, with a little room for rounding.
     let largest = exact.max();

@@ -43,23 +43,24 @@ pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
     let session = Session::open(opening(args, &config), console)?;
     let (world, accel_build_s) = session.world()?;
     let settings = settings(args);
-    let camera = cameras(&args.view, &world, console)?.into_iter().next().context("there is no camera; use --look-at")?;
+    let camera =
+        cameras(&args.view, &world, console)?.into_iter().next().context("there is no camera; use --look-at")?;
     let size = args.view.size;
     let layered = settings.transport == Transport::Gltf || has_blend(&world);
     check_picture_memory(size, if layered { LAYERED_PIXEL_BYTES } else { PIXEL_BYTES })?;
 
     let identity = Identity::new(&world, &camera, size.width, size.height, &settings);
     let before = previous(args, &identity, &world, &settings, console)?;
-    let resumed = before.as_ref().map_or(Resumed::default(), |state| Resumed {
-        spp: state.film.blocks * BLOCK,
-        rays: state.rays.total(),
-    });
+    let resumed = before
+        .as_ref()
+        .map_or(Resumed::default(), |state| Resumed { spp: state.film.blocks * BLOCK, rays: state.rays.total() });
     let mut tracing = Tracing::new(&world, &camera, size.width, size.height, &settings, before);
     tell::reference_begins(console, &camera.name, size, settings.rounded_spp(), resumed.spp);
     let is_complete = tracing.remaining() == 0;
     if is_complete {
         let (file, spp) = (args.output.display(), resumed.spp);
-        console.warn(format!("{file} has {spp} samples per pixel already: there is nothing to add; raise --spp for more"));
+        console
+            .warn(format!("{file} has {spp} samples per pixel already: there is nothing to add; raise --spp for more"));
     }
     let mut times = ReferenceTimes { load: session.load_s, accel_build: accel_build_s, ..Default::default() };
     times.trace = trace(&mut tracing, &args.output, &identity, console)?;

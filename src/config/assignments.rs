@@ -112,7 +112,11 @@ pub fn of_text(text: &str, place: &str) -> Result<Vec<Assignment>, ConfigError> 
             Ok(inner) if value.trim().starts_with('(') => {
                 for (key, value) in inner {
                     let place = format!("{place}, line {}", line(value));
-                    assignments.push(Assignment { place, path: format!("{section}.{key}"), value: value.trim().into() });
+                    assignments.push(Assignment {
+                        place,
+                        path: format!("{section}.{key}"),
+                        value: value.trim().into(),
+                    });
                 }
             }
             _ => {

@@ -59,7 +59,9 @@ fn layers_lie_on_each_other() {
     let set = layers.set(&["transport.paths.paths=2".to_owned()]).unwrap().config().unwrap();
     assert_eq!(set.transport, Transport::Paths { paths: 2 });
     // The settings of a choice that are not named stay as the layers below have them.
-    let config = Layers::default().text("(store: (occlusion: moments(resolution: 6)), query: (test: chebyshev(power: 1, floor: 0)))", "a").unwrap();
+    let config = Layers::default()
+        .text("(store: (occlusion: moments(resolution: 6)), query: (test: chebyshev(power: 1, floor: 0)))", "a")
+        .unwrap();
     let config = config.text("(store: (occlusion: moments(exponent: 20)))", "b").unwrap().config().unwrap();
     let expected = MomentsStore { resolution: 6, exponent: 20.0, ..Default::default() };
     assert_eq!(config.store.occlusion, OcclusionStore::Moments(expected));

@@ -300,7 +300,8 @@ mod tests {
         assert_eq!(rungs[1].label, "a spacing_m=1.0 visibility=moments(power: 3, floor: 0.05)");
         assert_eq!(rungs[1].config.query.test, VisibilityTest::Chebyshev { power: 3.0, floor: 0.05 });
         assert_eq!(rungs[5].config.grid.spacing_m, Some(0.5));
-        let expected = Config::default().with_overrides(&["solver.tolerance=1e-3".to_owned(), "placement.rays=64".to_owned()]);
+        let expected =
+            Config::default().with_overrides(&["solver.tolerance=1e-3".to_owned(), "placement.rays=64".to_owned()]);
         let expected = expected.unwrap();
         assert!(rungs.iter().all(|rung| rung.config.transport == expected.transport));
         assert!(rungs.iter().all(|rung| rung.config.placement == expected.placement));

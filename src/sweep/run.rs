@@ -88,8 +88,7 @@ impl Setting<'_, '_> {
         let world = self.scenery.world;
         let ReferenceSettings { spp, seed: truth_seed, .. } = self.reference_settings;
         let paths = BakedTruth::paths_for(spp);
-        let truth =
-            BakedTruth::trace(world, &config.capture, &bake.volume, paths, truth_seed, Progress::hidden());
+        let truth = BakedTruth::trace(world, &config.capture, &bake.volume, paths, truth_seed, Progress::hidden());
         let file_query = Query { volume: &bake.volume, settings: &config.query };
         let (masks, masks_s) = self.scenery.masks(&file_query);
         let query = Query { volume: &truth.truth.volume, settings: &config.query };

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use glam::Vec3;
-use lightprobe::probe::file::container::Container;
+use lightprobe::probe::container::Container;
 use serde_json::{Value, json};
 
 use crate::common::Folder;

@@ -39,7 +39,7 @@ fn every_file_renders_or_is_refused() {
         let folder = Folder::new();
         let (probes, pictures) = (folder.path().join("out.probes"), folder.path().join("pictures"));
         let scene = text(file);
-        let small = ["--set", "grid.divisions=(4,4,4)", "--set", "solver.max_bounces=2", "--env", "1,1,1"];
+        let small = ["--set", "grid.divisions=(4,4,4)", "--set", "solver.max_bounces=3", "--env", "1,1,1"];
         let bake = limited(&[&["bake", scene, "-o", text(&probes)], &small[..]].concat());
         if bake.code != Some(0) {
             let message = one_error(&bake);

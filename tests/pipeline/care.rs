@@ -108,7 +108,7 @@ fn more_memory_than_there_is() {
     }
     // What a budget keeps from being kept fits.
     let small =
-        ["--set", "grid.divisions=(12,12,12)", "--set", "capture.resolution=256", "--set", "solver.max_bounces=0"];
+        ["--set", "grid.divisions=(12,12,12)", "--set", "capture.resolution=256", "--set", "solver.max_bounces=1"];
     let small = [&["bake", text(&furnace), "-o", text(&output)][..], &small].concat();
     assert!(one_error(&limited(&small)).contains("--memory-budget"));
 
@@ -361,7 +361,7 @@ fn the_last_energy_is_that_of_the_file() {
         ("cornell", "--set grid.divisions=(4,4,4) --set encoding.irradiance=f32 --set capture.emission=gathered"),
         (
             "courtyard",
-            "--set grid.spacing_m=6 --set encoding.irradiance=f32 --env 0.5,0.7,1 --set solver.max_bounces=2",
+            "--set grid.spacing_m=6 --set encoding.irradiance=f32 --env 0.5,0.7,1 --set solver.max_bounces=3",
         ),
     ] {
         let baked = bake(&folder, &scene(name), words);
@@ -402,7 +402,7 @@ fn a_dry_run_foretells_all_that_is_large() {
 fn probes_stand_out_in_the_dark() {
     let folder = Folder::new();
     let rooms = scene("two_rooms_sealed");
-    let baked = bake(&folder, &rooms, "--set grid.spacing_m=1.5 --set solver.max_bounces=1");
+    let baked = bake(&folder, &rooms, "--set grid.spacing_m=1.5 --set solver.max_bounces=2");
     render(&folder, &rooms, &baked.path, "out", "--camera dark --size 320x180");
     let picture = image::open(folder.path().join("out/probes.png")).unwrap().into_rgb8();
     assert_eq!(picture.width(), 320);

@@ -112,7 +112,7 @@ fn arguments_that_do_not_parse() {
 #[test]
 fn render_checks_its_arguments() {
     let folder = Folder::new();
-    let baked = bake(&folder, &scene("two_rooms_open"), "--set grid.spacing_m=2 --set solver.max_bounces=1");
+    let baked = bake(&folder, &scene("two_rooms_open"), "--set grid.spacing_m=2 --set solver.max_bounces=2");
     let output = folder.path().join("out");
     let bad = |scene: &Path, probes: &Path, arguments: &[&str], words: &[&str]| {
         let start = ["render", text(scene), text(probes), "-o", text(&output)];
@@ -240,7 +240,7 @@ fn outputs_to_missing_folders() {
 fn all_cameras_and_free_ones() {
     let folder = Folder::new();
     let rooms = scene("two_rooms_open");
-    let baked = bake(&folder, &rooms, "--set grid.spacing_m=2 --set solver.max_bounces=1");
+    let baked = bake(&folder, &rooms, "--set grid.spacing_m=2 --set solver.max_bounces=2");
     let reports = render(&folder, &rooms, &baked.path, "all", "--camera all --size 16x9");
     let names: Vec<&str> = reports.as_array().unwrap().iter().map(|r| r["camera"].as_str().unwrap()).collect();
     assert_eq!(names, ["lit", "dark"]);

@@ -21,7 +21,7 @@ struct Rooms {
 impl Rooms {
     fn new() -> Rooms {
         let folder = Folder::new();
-        let baked = bake(&folder, &scene("two_rooms_open"), "--set grid.spacing_m=1.5 --set solver.max_bounces=3");
+        let baked = bake(&folder, &scene("two_rooms_open"), "--set grid.spacing_m=1.5 --set solver.max_bounces=4");
         render(&folder, &scene("two_rooms_open"), &baked.path, "plain", &format!("--size {SIZE}"));
         let exact = LayeredImage::read_exr(&folder.path().join("plain/visibility_ray.exr")).expect("a picture");
         Rooms { folder, baked, exact }

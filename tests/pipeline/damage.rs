@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use lightprobe::probe::container::Container;
 use lightprobe::probe::file;
-use lightprobe::probe::file::container::Container;
 use serde_json::{Value, json};
 
 use crate::common::Folder;

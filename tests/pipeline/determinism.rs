@@ -46,12 +46,12 @@ fn check(folder: &Folder, scene: &Path, words: &str) {
 
 #[test]
 fn rooms_with_a_lamp() {
-    check(&Folder::new(), &scene("two_rooms_open"), "--set grid.spacing_m=1.5 --set solver.max_bounces=4");
+    check(&Folder::new(), &scene("two_rooms_open"), "--set grid.spacing_m=1.5 --set solver.max_bounces=5");
 }
 
 #[test]
 fn textures_and_masked_leaves() {
-    check(&Folder::new(), &scene("glossy_room"), "--set grid.spacing_m=1.5 --set solver.max_bounces=4");
+    check(&Folder::new(), &scene("glossy_room"), "--set grid.spacing_m=1.5 --set solver.max_bounces=5");
 }
 
 #[test]
@@ -68,7 +68,7 @@ fn a_scene_far_from_the_origin_gives_the_same_tensors() {
     let folder = Folder::new();
     let scenes = [scene("two_rooms_open"), scene("glossy_room"), blended(&folder)];
     for (scene, spacing) in scenes.iter().zip([1.5, 1.5, 0.5]) {
-        let words = format!("--set grid.spacing_m={spacing} --set solver.max_bounces=4");
+        let words = format!("--set grid.spacing_m={spacing} --set solver.max_bounces=5");
         let here = bake(&folder, scene, &words).file;
         let bytes = std::fs::read(scene).unwrap();
         for translation in [[1e5, 0.0, 0.0], [-1e5, 1e5, 1e5], [1e5 + 0.1, -0.3, 7.7]] {

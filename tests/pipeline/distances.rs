@@ -2,10 +2,10 @@
 
 use glam::{DVec3, UVec3, Vec2, Vec3};
 use lightprobe::probe::lattice::ProbeState;
-use lightprobe::probe::query::{Query, QueryPoint, QuerySettings, Visibility, VisibilitySettings};
+use lightprobe::probe::query::{Query, QueryPoint, QuerySettings, Visibility, VisibilityTest};
 use lightprobe::probe::store::map::OctahedralMaps;
 use lightprobe::probe::store::surface::Facing;
-use lightprobe::probe::store::volume::IrradianceCurve;
+use lightprobe::probe::store::{IrradianceStore, Occlusion};
 use lightprobe::probe::{Grid, Volume};
 
 use crate::common::{Folder, Gltf};
@@ -118,27 +118,18 @@ fn pair(above: Vec2, below: Vec2) -> Volume {
     // Resolution 1 cannot tell halves apart; two columns can, along x.
     distance = OctahedralMaps { resolution: 2, texels: [[above, below]; 4].concat(), ..distance };
     Volume {
-        grid: Grid {
-            origin_world: DVec3::ZERO,
-            origin: Vec3::ZERO,
-            spacing: Vec3::ONE,
-            divisions: UVec3::new(2, 1, 1),
-        },
+        grid: Grid::from_parts(DVec3::ZERO, Vec3::ONE, UVec3::new(2, 1, 1)).expect("a grid"),
         states: vec![ProbeState::Active; 2],
         positions: vec![Vec3::ZERO, Vec3::X],
-        irradiance: OctahedralMaps::new(2, 1, 0, glam::Vec3A::ONE),
-        curve: IrradianceCurve::Linear,
-        distance: Some(distance),
-        surface_visibility: None,
+        irradiance: IrradianceStore::default().zeros(2, 1),
+        occlusion: Occlusion::Moments(distance),
     }
 }
 
 /// Weight that visibility gives probe 0, seen from a point at this distance straight above it along Z.
 fn weight(volume: &Volume, distance: f32) -> f32 {
-    let settings = QuerySettings {
-        visibility: VisibilitySettings::Moments { power: 1.0, floor: 0.0 },
-        ..QuerySettings::default()
-    };
+    let settings =
+        QuerySettings { test: VisibilityTest::Chebyshev { power: 1.0, floor: 0.0 }, ..QuerySettings::default() };
     let point = QueryPoint {
         position: Vec3::Z * distance,
         normal: Vec3::NEG_Z,

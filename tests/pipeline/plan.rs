@@ -60,7 +60,7 @@ fn two_rooms() {
 
 #[test]
 fn courtyard() {
-    let words = "--set grid.spacing_m=4 --set solver.max_bounces=3 --set capture.resolution=16";
+    let words = "--set grid.spacing_m=4 --set solver.max_bounces=4 --set capture.resolution=16";
     check(&scene("courtyard"), words, "");
     check(&scene("courtyard"), &format!("{words} {MOMENTS}"), "");
 }
@@ -94,6 +94,6 @@ fn a_room_without_anything_in_the_way_has_no_visibility() {
 /// not change it for the others.
 #[test]
 fn courtyard_under_a_sky() {
-    let words = "--set grid.spacing_m=4 --set solver.max_bounces=3 --set capture.resolution=16 --env 0.3,0.5,0.8";
+    let words = "--set grid.spacing_m=4 --set solver.max_bounces=4 --set capture.resolution=16 --env 0.3,0.5,0.8";
     check(&scene("courtyard"), words, "--env 0.3,0.5,0.8");
 }

@@ -117,14 +117,14 @@ fn bake_reports() {
     }
 }
 
-/// Indices count, residuals of plain sweeps fall, and the solver's figures fit to the sweeps.
+/// Indices count reflections, residuals of plain iterations fall, and the solver's figures fit the iterations.
 fn bounces(report: &Value) {
     let bounces = report["bounces"].as_array().unwrap();
     let figure = |i: usize, key: &str| bounces[i][key].as_f64().unwrap_or_else(|| panic!("{key} of bounce {i}"));
     let accelerated = |i: usize| bounces[i]["accelerated"].as_bool().unwrap();
     assert!(bounces.len() > 2);
     for i in 0..bounces.len() {
-        assert_eq!(figure(i, "index"), i as f64);
+        assert_eq!(figure(i, "index"), (i + 1) as f64);
         if i > 0 && !accelerated(i) {
             assert!(figure(i, "residual") < figure(i - 1, "residual"), "the residual grows at bounce {i}");
             // Light only ever adds; f32 texels.
@@ -134,7 +134,7 @@ fn bounces(report: &Value) {
     let solver = |key: &str| report["solver"][key].as_f64().unwrap_or_else(|| panic!("solver.{key}"));
     let combined = (0..bounces.len()).filter(|&i| accelerated(i)).count();
     assert_eq!(solver("accelerated"), combined as f64);
-    // One sweep more, of even light, tells the spectral radius where sweeps are combined.
+    // One application more, to even light, tells the spectral radius where iterations are combined.
     assert_eq!(solver("operator_applications"), (bounces.len() + usize::from(combined > 0)) as f64);
     let radius = report["spectral_radius_estimate"].as_f64().unwrap();
     let norm = solver("operator_norm");
@@ -147,7 +147,7 @@ fn bounces(report: &Value) {
 }
 
 #[test]
-fn plain_and_combined_sweeps_find_the_same_light() {
+fn plain_and_combined_iterations_find_the_same_light() {
     let folder = Folder::new();
     let rooms = scene("two_rooms_open");
     let baked = |how: &str| {
@@ -155,8 +155,8 @@ fn plain_and_combined_sweeps_find_the_same_light() {
         bake(&folder, &rooms, &words)
     };
     let (plain, combined) = (baked("never"), baked("always"));
-    let sweeps = |baked: &Bake| baked.report["bounces"].as_array().unwrap().len();
-    assert!(sweeps(&combined) < sweeps(&plain), "{} {}", sweeps(&combined), sweeps(&plain));
+    let iterations = |baked: &Bake| baked.report["bounces"].as_array().unwrap().len();
+    assert!(iterations(&combined) < iterations(&plain), "{} {}", iterations(&combined), iterations(&plain));
     assert_eq!(plain.report["solver"]["accelerated"], 0);
     // Both stop at a ten-thousandth of the largest texel, by an estimate.
     let texels = |baked: &Bake| -> Vec<f64> {
@@ -189,7 +189,7 @@ fn the_report_file_is_the_printed_report() {
 #[test]
 fn render_reports() {
     let folder = Folder::new();
-    let baked = bake(&folder, &scene("two_rooms_open"), "--set grid.spacing_m=1.5 --set solver.max_bounces=3");
+    let baked = bake(&folder, &scene("two_rooms_open"), "--set grid.spacing_m=1.5 --set solver.max_bounces=4");
     let report = render(&folder, &scene("two_rooms_open"), &baked.path, "run", "--size 96x54 --exposure 1.5 --seed 3");
     common(&report, "render");
     assert_eq!(report["seed"], 3);
@@ -238,7 +238,7 @@ fn render_reports() {
 #[test]
 fn pictures_hold_their_layers_and_these_add_up() {
     let folder = Folder::new();
-    let baked = bake(&folder, &scene("two_rooms_open"), "--set grid.spacing_m=1.5 --set solver.max_bounces=3");
+    let baked = bake(&folder, &scene("two_rooms_open"), "--set grid.spacing_m=1.5 --set solver.max_bounces=4");
     render(&folder, &scene("two_rooms_open"), &baked.path, "run", "--size 64x36");
     let run = folder.path().join("run");
     for name in ["visibility_off", "visibility_on", "visibility_ray"] {

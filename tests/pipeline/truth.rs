@@ -53,7 +53,7 @@ fn check(path: &Path, set: &[&str], limit: f64) {
     let scene = scene::load(path, &LoadOptions::default()).expect("the scene");
     let set: Vec<String> = set.iter().map(|s| (*s).to_owned()).collect();
     let config = Config::default().with_overrides(&set).expect("the settings");
-    let world = World::new(&scene, 1.0, config.solver.albedo_max).expect("Embree");
+    let world = World::new(&scene, 1.0, config.materials.albedo_max).expect("Embree");
     let circumstances =
         Circumstances { seed: 3, memory_budget_bytes: None, progress: Progress::hidden(), checkpoint: None };
     let record = SceneRecord { name: scene.name.clone(), blake3: scene.blake3.clone() };
@@ -61,7 +61,7 @@ fn check(path: &Path, set: &[&str], limit: f64) {
     let volume = prepared.bake(&circumstances, &record).expect("a bake").volume;
     let truth = Truth::trace(&world, &config.capture, &volume, 2, 5, Progress::hidden());
 
-    let resolution = volume.irradiance.resolution;
+    let resolution = config.store.irradiance.fineness().resolution;
     // Three texels on either side of the map.
     let texels = [1, resolution * 3 + 2, resolution * 5 + 6, resolution * 7 + 3];
     let active: Vec<usize> = (0..truth.runs[0].len()).filter(|&p| !truth.runs[0][p].is_empty()).collect();

@@ -9,9 +9,9 @@ use anyhow::{Context, Result, bail};
 
 use crate::cli::RenderArgs;
 use crate::commands::session::Session;
-use crate::light::World;
 use crate::commands::tell;
 use crate::image::LayeredImage;
+use crate::light::World;
 use crate::math::blocks::BLOCK;
 use crate::report::reference_layers::ReferenceLayers;
 use crate::report::render::ReferenceSummary;

@@ -52,7 +52,8 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
     check_all(&ladders, &session.scene)?;
     check_picture_memory(args.view.size, PIXEL_BYTES)?;
     let (world, accel_build_s) = session.world()?;
-    let camera = cameras(&args.view, &world, console)?.into_iter().next().context("there is no camera; use --look-at")?;
+    let camera =
+        cameras(&args.view, &world, console)?.into_iter().next().context("there is no camera; use --look-at")?;
     check_captures(&ladders, &world, session.seed)?;
 
     create_folder(&args.output)?;
@@ -77,12 +78,7 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
         reference_settings: ReferenceSettings { spp: reference.spp, ..settings },
         store: Store::new(&args.output)?,
         // Times depend on the threads.
-        identity: format!(
-            "{}spp = {}\nthreads = {}\n",
-            reference.identity.to_text(),
-            reference.spp,
-            session.threads
-        ),
+        identity: format!("{}spp = {}\nthreads = {}\n", reference.identity.to_text(), reference.spp, session.threads),
     };
     let mut work = Work::new(&setting, &ladders, args, console);
     let outcomes = work.run_all()?;

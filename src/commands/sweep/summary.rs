@@ -48,13 +48,7 @@ const FIGURES: &[(&str, Figure)] = &[
 ];
 
 impl Outcome {
-    pub fn new(
-        ladder: usize,
-        rung: &Rung,
-        runs: Vec<RunRecord>,
-        split: Split,
-        reference_mean: Option<f64>,
-    ) -> Outcome {
+    pub fn new(ladder: usize, rung: &Rung, runs: Vec<RunRecord>, split: Split, reference_mean: Option<f64>) -> Outcome {
         let value = |figure: Figure| -> Vec<Option<f64>> {
             runs.iter().map(|run| figure(run, run.method(Method::On.name())?)).collect()
         };

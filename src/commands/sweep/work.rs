@@ -55,11 +55,7 @@ impl<'a, 's> Work<'a, 's> {
     }
 
     /// What limits each ladder's best configuration.
-    pub fn floors(
-        &self,
-        ladders: &[LadderReport],
-        outcomes: &[Outcome],
-    ) -> Result<Vec<FloorReport>, SweepError> {
+    pub fn floors(&self, ladders: &[LadderReport], outcomes: &[Outcome]) -> Result<Vec<FloorReport>, SweepError> {
         let mut floors = Vec::new();
         for ladder in ladders {
             let Some((index, best)) = ladder.best.and_then(|i| Some((i, outcomes.get(i)?))) else { continue };

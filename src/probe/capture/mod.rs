@@ -10,6 +10,9 @@ pub mod surfel;
 use glam::{DVec3, Vec3, Vec3A};
 use serde::{Deserialize, Serialize};
 
+use self::rays::{Layout, TexelRay};
+pub use self::rays::{OctahedralRays, Rays};
+use self::surfel::Surfel;
 use crate::light::World;
 use crate::light::lambert::reflected_radiance;
 use crate::light::path::PathSettings;
@@ -18,9 +21,6 @@ use crate::light::surface::SurfacePoint;
 use crate::math::blocks::{BLOCK, Block};
 use crate::math::random::{Purpose, Random, Spread};
 use crate::math::statistics::Moments;
-pub use self::rays::{OctahedralRays, Rays};
-use self::rays::{Layout, TexelRay};
-use self::surfel::Surfel;
 use crate::trace::Ray;
 
 /// How the light of emissive surfaces and the sky reaches the surfaces that probes see.

@@ -109,9 +109,8 @@ pub fn read(path: &Path) -> Result<ProbeFile, FileError> {
 fn decode(container: &Container, file_bytes: u64) -> Result<ProbeFile, String> {
     let record: GridRecord = container.json("grid")?;
     let spacing = Vec3::from(record.spacing);
-    let grid = Grid::from_parts(DVec3::from(record.origin), spacing, UVec3::from(record.divisions)).ok_or_else(|| {
-        format!("metadata 'grid' makes no grid: {:?} probes at spacing {spacing}", record.divisions)
-    })?;
+    let grid = Grid::from_parts(DVec3::from(record.origin), spacing, UVec3::from(record.divisions))
+        .ok_or_else(|| format!("metadata 'grid' makes no grid: {:?} probes at spacing {spacing}", record.divisions))?;
     if record.border > 1 {
         return Err(format!("metadata 'grid' has the unknown border {}", record.border));
     }
@@ -132,7 +131,8 @@ fn decode(container: &Container, file_bytes: u64) -> Result<ProbeFile, String> {
         positions,
     };
     let config = container.text("config")?.clone();
-    let shape = |(name, t): (&String, &super::container::Tensor)| (name.clone(), (t.dtype.to_string(), t.shape.clone()));
+    let shape =
+        |(name, t): (&String, &super::container::Tensor)| (name.clone(), (t.dtype.to_string(), t.shape.clone()));
     Ok(ProbeFile {
         volume_in_grid,
         query: match container.metadata.contains_key("query") {

@@ -12,8 +12,8 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 pub use self::settle::{SettleSettings, Settler};
-pub use self::survey::SurveySettings;
 use self::survey::Survey;
+pub use self::survey::SurveySettings;
 use super::lattice::{Grid, ProbeState};
 use super::store::OcclusionStore;
 use super::store::surface::SurfaceVisibility;

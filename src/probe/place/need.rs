@@ -86,14 +86,7 @@ pub fn relocate(settler: &Settler, placement: &mut Placement, survey: &Survey) -
 }
 
 /// Where the surface of an entry can be seen from; `margin` is that of the survey's voxels.
-fn need(
-    world: &World,
-    grid: &Grid,
-    table: &SurfaceVisibility,
-    cell: CellIndex,
-    entry: &Entry,
-    margin: f32,
-) -> Need {
+fn need(world: &World, grid: &Grid, table: &SurfaceVisibility, cell: CellIndex, entry: &Entry, margin: f32) -> Need {
     let (low, sides) = grid.cell_box(cell);
     let voxel_size = sides / table.voxels_per_cell as f32;
     let centre = low + (entry.voxel.as_vec3() + 0.5) * voxel_size;

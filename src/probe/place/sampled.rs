@@ -18,9 +18,8 @@ pub fn sampled_probes(grid: &Grid, mesh: &Mesh, reach: f32) -> Vec<bool> {
         for cell in grid.cells_near(low, high, reach) {
             let occupied = &mut occupied[cell.0 as usize];
             // In units of the cell, around its middle.
-            *occupied = *occupied
-                || beyond
-                || triangle_meets_box(corners.map(|c| grid.cell_from_scene(cell, c) - 0.5), half);
+            *occupied =
+                *occupied || beyond || triangle_meets_box(corners.map(|c| grid.cell_from_scene(cell, c) - 0.5), half);
         }
     }
     let mut sampled = vec![false; grid.probe_count()];

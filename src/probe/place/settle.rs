@@ -68,10 +68,9 @@ impl SettleSettings {
         ] {
             rule(key, value.to_string(), (0.0..=1.0).contains(&value), "use a number from 0 to 1");
         }
-        for (key, value) in [
-            ("placement.rule.settle.max_moves", self.max_moves),
-            ("placement.rule.settle.need_tries", self.need_tries),
-        ] {
+        for (key, value) in
+            [("placement.rule.settle.max_moves", self.max_moves), ("placement.rule.settle.need_tries", self.need_tries)]
+        {
             rule(key, value.to_string(), value <= 1024, "use 0 to 1024");
         }
     }

@@ -12,8 +12,8 @@ mod settings;
 
 use glam::{Vec2, Vec3, Vec3A};
 
-pub use self::settings::{Blend, DirectionWeight, QuerySettings, VisibilityTest};
 use self::corner_test::{CornerTest, Mask, MomentsTest, SurfaceTest};
+pub use self::settings::{Blend, DirectionWeight, QuerySettings, VisibilityTest};
 use super::Volume;
 use super::lattice::grid::{Cell, ProbeIndex};
 use super::store::Occlusion;

@@ -11,8 +11,8 @@ use serde_json::Value;
 use super::encode::{ColorFormat, decode_colors, encode_colors};
 use super::kernel::{Directions, Kernel};
 use super::map::{OctahedralMaps, Taps, fill_with_border, interior_texel};
-use crate::probe::container::{Container, EncodingLosses};
 use crate::math::octahedral::{oct_from_direction, solid_angle_density, texel_centre, texel_direction};
+use crate::probe::container::{Container, EncodingLosses};
 
 /// How probes hold irradiance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -96,9 +96,7 @@ impl OcclusionStore {
     /// Most memory that one probe takes while it is baked and encoded.
     pub fn working_bytes(&self, border: usize) -> u64 {
         match self {
-            OcclusionStore::Moments(store) => {
-                ((store.resolution + 2 * border) as u64).pow(2) * DISTANCE_TEXEL_BYTES
-            }
+            OcclusionStore::Moments(store) => ((store.resolution + 2 * border) as u64).pow(2) * DISTANCE_TEXEL_BYTES,
             OcclusionStore::None | OcclusionStore::Surface(_) => 0,
         }
     }
@@ -117,10 +115,9 @@ impl OcclusionStore {
     /// The key that makes it larger, with whether it is larger than its default; `None` where nothing grows with it.
     pub fn size_key(&self) -> Option<(&'static str, bool)> {
         match self {
-            OcclusionStore::Moments(store) => Some((
-                "store.occlusion.moments.resolution",
-                store.resolution > MomentsStore::default().resolution,
-            )),
+            OcclusionStore::Moments(store) => {
+                Some(("store.occlusion.moments.resolution", store.resolution > MomentsStore::default().resolution))
+            }
             OcclusionStore::None | OcclusionStore::Surface(_) => None,
         }
     }

@@ -16,8 +16,8 @@ use safetensors::Dtype;
 use serde::{Deserialize, Serialize};
 
 use crate::probe::container::Container;
-use crate::probe::lattice::grid::{Cell, CellIndex, Grid, ProbeIndex};
 use crate::probe::lattice::ProbeState;
+use crate::probe::lattice::grid::{Cell, CellIndex, Grid, ProbeIndex};
 
 /// Most voxels per cell and axis: 22³·6 keys fit 16 bits.
 pub const MAX_VOXELS_PER_CELL: u32 = 22;

@@ -39,7 +39,9 @@ pub fn write(path: &Path, identity: &str, progress: &Progress, volume: &Volume) 
     container.metadata.insert("format".into(), FORMAT.into());
     container.metadata.insert("identity".into(), identity.into());
     // Plain numbers: nothing in them can fail to serialise.
-    container.metadata.insert("progress".into(), serde_json::to_string(&(&progress.solution, &progress.control)).unwrap_or_default());
+    container
+        .metadata
+        .insert("progress".into(), serde_json::to_string(&(&progress.solution, &progress.control)).unwrap_or_default());
     container.write(path).map(|_| ())
 }
 
@@ -59,7 +61,8 @@ pub fn read(path: &Path, identity: &str, volume: &mut Volume) -> Result<Progress
     let history = match container.metadata.get("history") {
         None => None,
         Some(noise) => Some(
-            history(&container, noise, unknowns).ok_or_else(|| unusable("its earlier iterations are not of this grid"))?,
+            history(&container, noise, unknowns)
+                .ok_or_else(|| unusable("its earlier iterations are not of this grid"))?,
         ),
     };
     Ok(Progress { solution, control, history })

@@ -7,8 +7,8 @@ mod settings;
 pub mod solver;
 pub mod truth;
 
-pub use self::settings::{Acceleration, BounceSettings, Transport};
 use self::operator::{Captures, Operator};
+pub use self::settings::{Acceleration, BounceSettings, Transport};
 use self::solver::{Progress, Solution};
 use super::Volume;
 

@@ -122,7 +122,12 @@ impl Transport {
             Transport::Bounces(BounceSettings { max_bounces, max_iterations, tolerance, .. }) => {
                 if let Some(bounces) = max_bounces {
                     let holds = *bounces <= 1 << 20;
-                    rule("transport.bounces.max_bounces", bounces.to_string(), holds, "use 0 to 1048576, or None for all");
+                    rule(
+                        "transport.bounces.max_bounces",
+                        bounces.to_string(),
+                        holds,
+                        "use 0 to 1048576, or None for all",
+                    );
                 }
                 let holds = (1..=1 << 20).contains(max_iterations);
                 rule("transport.bounces.max_iterations", max_iterations.to_string(), holds, "use 1 to 1048576");

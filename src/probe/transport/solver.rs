@@ -274,8 +274,7 @@ fn missing_iterations(ratio: f64, missing: f64, tolerance: f64) -> f64 {
 
 /// How much of a field an iteration has changed.
 fn measure(x: &Field, g: &Field) -> Change {
-    let mut found =
-        Change { largest_change: Vec3::ZERO, norm: 0.0, largest: Vec3::ZERO, energy: 0.0, negative: 0 };
+    let mut found = Change { largest_change: Vec3::ZERO, norm: 0.0, largest: Vec3::ZERO, energy: 0.0, negative: 0 };
     for (x, g) in x.iter().zip(g) {
         let change = *g - *x;
         found.largest_change = found.largest_change.max(change.abs());

@@ -3,9 +3,10 @@
 use glam::Vec2;
 use rayon::prelude::*;
 
+use super::circumstances::Circumstances;
 use super::log::Log;
 use super::memory::surfels_bytes;
-use super::{Circumstances, Prepared};
+use super::prepared::Prepared;
 use crate::probe::capture::ProbeCapture;
 use crate::probe::store::Occlusion;
 use crate::probe::transport::operator::Captures;

@@ -1,7 +1,7 @@
 //! How much memory a bake takes: the arrays that grow with probes, resolutions and surfaces, by formulas beside which the
 //! rest is small.
 
-use super::BakeError;
+use super::circumstances::BakeError;
 use crate::config::Config;
 use crate::probe::Grid;
 use crate::probe::capture::ProbeCapture;

@@ -5,9 +5,10 @@ use std::time::Instant;
 use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
 
+use super::circumstances::Circumstances;
 use super::gather::{Budgeted, CHUNK_BYTES};
 use super::memory::{EMITTED_BYTES, SURFEL_BYTES, surfels_bytes};
-use super::{Circumstances, Prepared};
+use super::prepared::Prepared;
 use crate::math::fibonacci;
 use crate::probe::capture::ProbeCapture;
 use crate::probe::store::Occlusion;

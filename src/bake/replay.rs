@@ -4,8 +4,9 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
+use super::circumstances::Circumstances;
 use super::gather::CHUNK;
-use super::{Circumstances, Prepared};
+use super::prepared::Prepared;
 
 impl Prepared<'_, '_> {
     /// Rays per second of bare Embree over the rays of the capture, in its order.

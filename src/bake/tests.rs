@@ -1,14 +1,22 @@
 //! Resuming an interrupted bake; stiff scenes against a dense solution.
 
+use std::time::Duration;
+
 use glam::Vec3;
 use nalgebra::{DMatrix, DVector};
 use serde_json::json;
 
 use super::*;
+use crate::config::Config;
+use crate::light::World;
+use crate::probe::Volume;
+use crate::probe::capture::ProbeCapture;
+use crate::probe::file::SceneRecord;
+use crate::probe::store::Occlusion;
 use crate::probe::store::kernel::Kernel;
-use crate::probe::transport::BounceSettings;
-use crate::probe::transport::operator::{self, Field};
-use crate::probe::transport::solver;
+use crate::probe::transport::operator::{self, Field, Operator};
+use crate::probe::transport::solver::{self, Progress as Iterations};
+use crate::probe::transport::{BounceSettings, checkpoint};
 use crate::scene::{self, LoadOptions, Scene};
 
 #[path = "../../tests/common/mod.rs"]

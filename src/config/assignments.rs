@@ -6,7 +6,8 @@ use ron::error::SpannedError;
 use ron::value::RawValue;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 
-use super::{ConfigError, messages, ron_options};
+use super::messages;
+use super::ron_text::{ConfigError, ron_options};
 
 /// One key and what it is set to.
 #[derive(Debug, Clone, PartialEq)]

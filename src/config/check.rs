@@ -1,7 +1,8 @@
 //! What values a configuration may have. Every number is held against its range, NaN and infinities included: here, and
 //! in the settings of the stages.
 
-use super::{Config, ConfigError};
+use super::ron_text::ConfigError;
+use super::settings::{Config, STAGES};
 use crate::probe::lattice::grid::Bounds;
 
 /// Largest resolution of any octahedral map, texels per side.
@@ -58,9 +59,8 @@ impl Config {
         self.store.irradiance.check(MAX_RESOLUTION, &mut rule);
         self.store.occlusion.check(MAX_RESOLUTION, &mut rule);
         self.query.check(&mut rule);
-        let stages = crate::config::STAGES;
         for stage in &self.plan.keep {
-            let known = stages.contains(&stage.as_str());
+            let known = STAGES.contains(&stage.as_str());
             rule("plan.keep", stage.clone(), known, "use names of stages as `bake --dry-run` prints them");
         }
         first_error

@@ -6,7 +6,9 @@ use ron::error::SpannedError;
 use serde_json::Value;
 
 use super::assignments::{self, Assignment, below, choice};
-use super::{Config, ConfigError, aliases, messages, presets};
+use super::ron_text::{ConfigError, ron_options};
+use super::settings::Config;
+use super::{aliases, messages, presets};
 use crate::system::input::read_file;
 
 /// Assignments in the order in which they count: a later one replaces an earlier one.
@@ -73,8 +75,11 @@ impl Layers {
         for assignment in &self.assignments {
             tree.apply(assignment, &mut waiting)?;
         }
-        for assignment in waiting {
-            tree.apply(&assignment, &mut Vec::new())?;
+        for assignment in &waiting {
+            // What is still not there had no effect before either.
+            if tree.at(&assignment.path).is_some() {
+                tree.apply(assignment, &mut Vec::new())?;
+            }
         }
         let place = self.assignments.last().map_or("the configuration", |a| &a.place);
         let invalid = |place: &str, what: String| Err(ConfigError::Invalid { place: place.to_owned(), what });
@@ -90,6 +95,24 @@ impl Layers {
             Some(what) => invalid(place, what.to_owned()),
             None => Ok(config),
         }
+    }
+}
+
+impl Config {
+    /// Reads RON text over the defaults; `place` names it in errors.
+    ///
+    /// # Errors
+    /// The text is not RON, or has keys or values that a configuration does not take.
+    pub fn parse(text: &str, place: &str) -> Result<Config, ConfigError> {
+        Layers::default().text(text, place)?.config()
+    }
+
+    /// Applies `key=value` assignments in order.
+    ///
+    /// # Errors
+    /// Keys or values that a configuration does not take.
+    pub fn with_overrides(self, assignments: &[String]) -> Result<Config, ConfigError> {
+        Layers::over(self).set(assignments)?.config()
     }
 }
 
@@ -142,9 +165,6 @@ impl Tree {
 
     fn set(&mut self, Assignment { place, path, value }: &Assignment) -> Result<(), ConfigError> {
         let error = |what: String| ConfigError::Invalid { place: place.clone(), what };
-        if self.at(path).is_none() && aliases::today(path, value).is_some() {
-            return Ok(());
-        }
         let alone = alone(path, value);
         if let Ok(alone) = &alone {
             // Before JSON makes `null` of NaN and infinities, and so the default of a key that may be left out.
@@ -202,13 +222,28 @@ fn alone(path: &str, value: &str) -> Result<Config, SpannedError> {
             _ => format!("({key}: {inner})"),
         })
     };
-    let parse = |choices: usize| super::ron_options().from_str::<Config>(&text(choices));
+    let parse = |choices: usize| ron_options().from_str::<Config>(&text(choices));
     // The first key is a section, and what a choice stands before is in parentheses.
-    let candidates = (1..1usize << keys.len().min(8)).filter(|choices| choices & 1 == 0);
-    let plain = parse(0);
-    match plain {
-        Ok(config) => Ok(config),
-        Err(error) => candidates.filter_map(|choices| parse(choices).ok()).next().ok_or(error),
+    let mut best: Option<SpannedError> = None;
+    for choices in (0..1usize << keys.len().min(8)).filter(|choices| choices & 1 == 0) {
+        match parse(choices) {
+            Ok(config) => return Ok(config),
+            // Who gets as far as the value knows best what is wrong with it.
+            Err(error) => {
+                let is_about_value = matches!(
+                    &error.code,
+                    ron::Error::NoSuchEnumVariant { found, .. } | ron::Error::NoSuchStructField { found, .. }
+                        if !keys.contains(&found.as_str())
+                );
+                if best.is_none() || is_about_value {
+                    best = Some(error);
+                }
+            }
+        }
+    }
+    match best {
+        Some(error) => Err(error),
+        None => parse(0),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Presets: configurations compiled in, one file each under `configs/presets/`.
 
-use super::{Config, ConfigError, Layers};
+use super::ron_text::ConfigError;
 
 /// A named configuration.
 pub struct Preset {
@@ -21,16 +21,6 @@ pub const PRESETS: &[Preset] = &[
         text: include_str!("../../configs/presets/path.ron"),
     },
 ];
-
-impl Preset {
-    /// The preset over the defaults.
-    ///
-    /// # Errors
-    /// None, as a test knows.
-    pub fn config(&self) -> Result<Config, ConfigError> {
-        Layers::default().preset(self.name)?.config()
-    }
-}
 
 /// The preset of a name.
 ///

@@ -6,10 +6,14 @@ use super::*;
 use crate::probe::query::VisibilityTest;
 use crate::probe::store::OcclusionStore;
 use crate::probe::store::moments::MomentsStore;
-use crate::probe::transport::BounceSettings;
+use crate::probe::transport::{BounceSettings, Transport};
 
 fn with(assignments: &[&str]) -> Result<Config, ConfigError> {
     Config::default().with_overrides(&assignments.iter().map(|s| s.to_string()).collect::<Vec<_>>())
+}
+
+fn preset(name: &str) -> Config {
+    Layers::default().preset(name).unwrap().config().unwrap()
 }
 
 fn moments(resolution: usize) -> OcclusionStore {
@@ -21,16 +25,16 @@ fn ron_round_trip() {
     for config in [Config::default(), with(&["query.visibility=moments(power: 3, floor: 0.05)"]).unwrap()] {
         assert_eq!(Config::parse(&config.to_ron(), "itself").unwrap(), config, "{}", config.to_ron());
     }
-    let path = presets::find("path").unwrap().config().unwrap();
+    let path = preset("path");
     assert_eq!(Config::parse(&path.to_ron(), "itself").unwrap(), path);
 }
 
 #[test]
 fn every_preset_parses_and_default_is_the_default() {
     for preset in presets::PRESETS {
-        preset.config().unwrap();
+        super::Layers::default().preset(preset.name).unwrap().config().unwrap();
     }
-    assert_eq!(presets::find("default").unwrap().config().unwrap(), Config::default());
+    assert_eq!(preset("default"), Config::default());
     assert!(Layers::default().preset("defualt").unwrap_err().to_string().contains("default"));
 }
 
@@ -51,7 +55,7 @@ fn layers_lie_on_each_other() {
     let layers = Layers::default().preset("path").unwrap().text(scene, "scene.ron").unwrap();
     let config = layers.config().unwrap();
     // The scene's file says only what stands there: all else of the preset stays.
-    let preset = presets::find("path").unwrap().config().unwrap();
+    let preset = preset("path");
     assert_eq!(config.grid.spacing_m, Some(0.75));
     assert_eq!(config.transport, Transport::Paths { paths: 8 });
     assert_eq!(config.store, preset.store);

@@ -6,7 +6,7 @@ use safetensors::Dtype;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::{Container, Tensor};
+use super::safetensors::{Container, Tensor};
 
 /// What the formats had to give up of the values.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]

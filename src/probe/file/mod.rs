@@ -5,6 +5,8 @@
 
 pub mod legacy;
 mod record;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -2,6 +2,8 @@
 
 pub mod grid;
 mod state;
+#[cfg(test)]
+mod tests;
 
 pub use self::grid::{Grid, ProbeIndex};
 pub use self::state::ProbeState;

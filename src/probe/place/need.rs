@@ -8,8 +8,10 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::survey::{Survey, SurveySettings};
-use super::{Placement, Settler};
+use super::placement::Placement;
+use super::settings::SurveySettings;
+use super::settle::Settler;
+use super::survey::Survey;
 use crate::light::World;
 use crate::probe::lattice::ProbeState;
 use crate::probe::lattice::grid::{CellIndex, Grid, ProbeIndex};

@@ -2,79 +2,14 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
+use super::placement::{Placement, PlacementTask};
 use super::sampled::sampled_probes;
-use super::{Placement, PlacementRule, PlacementTask};
+use super::settings::{PlacementRule, SettleSettings};
 use crate::light::World;
 use crate::math::fibonacci;
 use crate::probe::lattice::{Grid, ProbeState};
 use crate::trace::Ray;
-
-/// Lengths are in spacings: the smallest of the grid's three.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SettleSettings {
-    /// Rays that decide about one probe.
-    pub rays: u32,
-    /// A probe counts as inside geometry (or outside the world) when more than this share of what its rays meet are
-    /// backs of surfaces, 0 to 1. Beside a sheet that has only a front nearly half of them are.
-    pub back_face_share: f32,
-    /// Move probes that are inside geometry, or touch it, into the open where it is near.
-    pub relocate: bool,
-    /// Farthest that a probe is moved from its grid point. Beyond half a spacing it would be nearer to a neighbour's place
-    /// than to its own; 0.45 is the bound of Majercik et al. 2021.
-    pub max_move: f32,
-    /// Nearer to a surface than this, a probe is moved away from it: the surface would fill 47 % of what it sees of a wall
-    /// one spacing wide.
-    pub min_clearance: f32,
-    /// How far from a surface a moved probe comes to lie: more than `min_clearance`, so that it is not moved again, and
-    /// less than the 0.125 that a voxel of the default table is wide, so that the surface's own voxels see it.
-    pub clearance: f32,
-    /// Moves tried before a probe stays as it was.
-    pub max_moves: u32,
-    /// How far from a surface that sees no probe one is put; half the free space where that is less.
-    pub need_distance: f32,
-    /// Surfaces in need tried for one probe, nearest first.
-    pub need_tries: u32,
-}
-
-impl Default for SettleSettings {
-    fn default() -> Self {
-        SettleSettings {
-            rays: 128,
-            back_face_share: 0.5,
-            relocate: true,
-            max_move: 0.45,
-            min_clearance: 0.05,
-            clearance: 0.12,
-            max_moves: 4,
-            need_distance: 0.2,
-            need_tries: 12,
-        }
-    }
-}
-
-impl SettleSettings {
-    /// Calls `rule(key, value, holds, rule)` for every number in it.
-    pub fn check(&self, rule: &mut dyn FnMut(&'static str, String, bool, &'static str)) {
-        rule("placement.rule.settle.rays", self.rays.to_string(), (1..=65_536).contains(&self.rays), "use 1 to 65536");
-        for (key, value) in [
-            ("placement.rule.settle.back_face_share", self.back_face_share),
-            ("placement.rule.settle.max_move", self.max_move),
-            ("placement.rule.settle.min_clearance", self.min_clearance),
-            ("placement.rule.settle.clearance", self.clearance),
-            ("placement.rule.settle.need_distance", self.need_distance),
-        ] {
-            rule(key, value.to_string(), (0.0..=1.0).contains(&value), "use a number from 0 to 1");
-        }
-        for (key, value) in
-            [("placement.rule.settle.max_moves", self.max_moves), ("placement.rule.settle.need_tries", self.need_tries)]
-        {
-            rule(key, value.to_string(), value <= 1024, "use 0 to 1024");
-        }
-    }
-}
 
 /// What the rays around a position meet.
 #[derive(Debug, Clone, Copy)]

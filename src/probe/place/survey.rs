@@ -2,10 +2,10 @@
 
 use glam::{UVec3, Vec2, Vec3};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
-use super::Placement;
 use super::overlap::triangle_meets_box;
+use super::placement::Placement;
+use super::settings::SurveySettings;
 use crate::light::World;
 use crate::math::random::{Purpose, Random};
 use crate::probe::lattice::grid::{CellIndex, Grid};
@@ -13,58 +13,6 @@ use crate::probe::store::surface::{Facing, SurfaceVisibility, active_corners, ke
 use crate::scene::{Mesh, TriangleIndex};
 use crate::trace::Ray;
 use crate::trace::offset::ray_offset;
-
-/// How closely surfaces are looked at.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SurveySettings {
-    /// Points tried on a surface within one voxel at first.
-    pub first_points: u32,
-    /// Points tried in all where the first ones disagree.
-    pub all_points: u32,
-    /// Points tried on the outside of a surface until one sees any probe: where walls meet, most of a voxel's surface may
-    /// lie inside the other wall, and the strip that does not must still be found.
-    pub search_points: u32,
-    /// Most search points on all triangles of a voxel's side together, as far as each still gets `all_points`/2: finely
-    /// divided surfaces need no more points than a wall of two triangles does.
-    pub group_search_points: u32,
-    /// Voxels are taken larger by this share of their side on every side when surfaces are sorted into them, so that a
-    /// surface on the border of two is known in both, on whichever side of it rounding puts the point that asks.
-    pub voxel_margin: f32,
-    /// Layers of probes around a cell that are searched for a probe where a surface sees none of its eight.
-    pub far_rings: u32,
-}
-
-impl Default for SurveySettings {
-    fn default() -> Self {
-        SurveySettings {
-            first_points: 2,
-            all_points: 8,
-            search_points: 32,
-            group_search_points: 128,
-            voxel_margin: 0.03,
-            far_rings: 3,
-        }
-    }
-}
-
-impl SurveySettings {
-    /// Calls `rule(key, value, holds, rule)` for every number in it.
-    pub fn check(&self, rule: &mut dyn FnMut(&'static str, String, bool, &'static str)) {
-        for (key, value) in [
-            ("placement.survey.first_points", self.first_points),
-            ("placement.survey.all_points", self.all_points),
-            ("placement.survey.search_points", self.search_points),
-            ("placement.survey.group_search_points", self.group_search_points),
-        ] {
-            // Votes are counted in 8 bits.
-            rule(key, value.to_string(), (1..=255).contains(&value), "use 1 to 255");
-        }
-        let margin = self.voxel_margin;
-        rule("placement.survey.voxel_margin", margin.to_string(), (0.0..=0.5).contains(&margin), "use 0 to 0.5");
-        rule("placement.survey.far_rings", self.far_rings.to_string(), self.far_rings <= 16, "use 0 to 16");
-    }
-}
 
 /// Memory that a survey takes at most: one [`Side`] for each side of a triangle in each voxel that it meets, twice while
 /// they are collected. A triangle meets as many voxels as its area covers, those along its edges, and one.

@@ -3,7 +3,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::QueryPoint;
+use super::point::QueryPoint;
 use crate::probe::lattice::grid::{Cell, Grid, ProbeIndex};
 use crate::probe::store::map::OctahedralMaps;
 use crate::probe::store::moments::chebyshev;

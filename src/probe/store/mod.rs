@@ -10,6 +10,8 @@ pub mod map;
 pub mod moments;
 pub mod occlusion;
 pub mod surface;
+#[cfg(test)]
+mod tests;
 pub mod volume;
 
 use serde::{Deserialize, Serialize};

@@ -5,6 +5,8 @@ pub mod checkpoint;
 pub mod operator;
 mod settings;
 pub mod solver;
+#[cfg(test)]
+mod tests;
 pub mod truth;
 
 use self::operator::{Captures, Operator};

@@ -1,0 +1,154 @@
+//! The bake itself, from captures to the file's content.
+
+use std::time::Instant;
+
+use super::circumstances::{BakeError, Checkpoint, Circumstances};
+use super::figures::{Numerics, Rays, Times};
+use super::gather::{Budgeted, gather};
+use super::log::Log;
+use super::prepared::Prepared;
+use crate::plan::{Line, Plan};
+use crate::probe::Volume;
+use crate::probe::capture::ProbeCapture;
+use crate::probe::container::{Container, FileError};
+use crate::probe::file::{self, Provenance, SceneRecord};
+use crate::probe::lattice::ProbeState;
+use crate::probe::store::Occlusion;
+use crate::probe::transport::operator::Operator;
+use crate::probe::transport::solver::{Progress as Iterations, Solution};
+use crate::probe::transport::{self, checkpoint};
+
+/// A finished bake.
+pub struct Baked {
+    pub volume: Volume,
+    pub container: Container,
+    pub solution: Solution,
+    pub plan: Plan,
+    pub rays: Rays,
+    pub times: Times,
+    pub numerics: Numerics,
+    /// Bytes per probe in the layout that shading uses: in full, and after the plan.
+    pub runtime_bytes: (f64, f64),
+}
+
+impl Prepared<'_, '_> {
+    /// Runs the rest of the pipeline. `load` and `accel_build` times are the caller's to fill.
+    ///
+    /// # Errors
+    /// Too little memory for the captures; a checkpoint that cannot be read or written.
+    pub fn bake(self, circumstances: &Circumstances, scene: &SceneRecord) -> Result<Baked, BakeError> {
+        self.check_memory(circumstances)?;
+        let config = self.config;
+        let mut log = Log::new(circumstances.progress);
+        log.times.survey = self.survey_s;
+        log.rays.survey = self.placement.rays;
+        log.numerics.probes_inside_geometry = self.placement.count(ProbeState::InsideGeometry);
+        log.numerics.dropped_triangles = self.world.scene.dropped.total();
+        log.numerics.albedo_clamped = self.world.clamped_materials();
+
+        let capture = self.capture(circumstances);
+        let trace = |probe: usize| self.trace(&capture, probe);
+        let (captures, occlusion) = gather(&self, &trace, circumstances, &mut log);
+        // What neither bounces nor shading ask for is only stored.
+        let (asked, unasked) =
+            if self.plan.visibility { (occlusion, None) } else { (Occlusion::None, Some(occlusion)) };
+        let mut volume = self.volume(asked);
+        let solution = self.transport(&captures, &mut volume, circumstances, scene, &mut log)?;
+        let mut plan = self.plan.clone();
+        let done = solution.bounces.len().saturating_sub(1) as u32;
+        plan.add_bounces(done, &config.transport, solution.converged, log.times.bounces);
+        if let Some(unasked) = unasked {
+            volume.occlusion = unasked;
+        }
+        let container = self.encode(&volume, &plan, circumstances.seed, scene, &mut log);
+        let Log { rays, times, numerics, .. } = log;
+        let runtime_bytes = self.runtime_bytes();
+        Ok(Baked { volume, container, solution, plan, rays, times, numerics, runtime_bytes })
+    }
+
+    /// Brings light from surface to surface until it has settled; saves it now and then.
+    fn transport<F: Fn(usize) -> ProbeCapture + Sync>(
+        &self,
+        captures: &Budgeted<F>,
+        volume: &mut Volume,
+        circumstances: &Circumstances,
+        scene: &SceneRecord,
+        log: &mut Log,
+    ) -> Result<Solution, BakeError> {
+        let config = self.config;
+        let kernel =
+            log.time(|times| &mut times.filter, || volume.irradiance.kernel(&config.capture.rays.directions()));
+        let operator = Operator {
+            captures,
+            kernel: &kernel,
+            query: &config.query,
+            gathers_emission: config.capture.gathers_emission(),
+        };
+        let identity = checkpoint::identity(&scene.blake3, circumstances.seed, &config.to_ron());
+        let mut progress = Iterations::default();
+        if let Some(Checkpoint { path, resume: true, .. }) = &circumstances.checkpoint
+            && path.exists()
+        {
+            progress = checkpoint::read(path, &identity, volume)?;
+        }
+        let most = config.transport.iteration().most() as usize;
+        let mut saver = Saver::new(circumstances.checkpoint.as_ref(), &identity);
+        let solution = log.stage(
+            |times| &mut times.bounces,
+            "bounces",
+            most,
+            |bar| {
+                transport::run(&config.transport, &operator, volume, progress, |progress, volume| {
+                    bar.set_position(progress.solution.bounces.len() as u64);
+                    let residual = progress.solution.bounces.last().map_or(0.0, |b| b.residual);
+                    bar.set_message(format!("residual {residual:.1e}"));
+                    saver.save(progress, volume);
+                })
+            },
+        );
+        saver.saved?;
+        log.numerics.non_finite += solution.non_finite;
+        Ok(solution)
+    }
+
+    /// The volume as a file's content.
+    fn encode(&self, volume: &Volume, plan: &Plan, seed: u64, scene: &SceneRecord, log: &mut Log) -> Container {
+        let config = self.config;
+        // Times stay out of the file: the same input must give the same bytes.
+        let lines: Vec<_> = plan.lines.iter().map(|l| Line { saved_s: None, ..l.clone() }).collect();
+        let plan = serde_json::json!({ "visibility": plan.visibility, "lines": lines });
+        let (text, query) = (config.to_ron(), config.query_record());
+        let border = config.store.border;
+        let provenance = Provenance { config: &text, query: &query, scene, seed, plan: &plan, border };
+        let (container, losses) = log.time(|times| &mut times.encode, || file::encode(volume, &provenance));
+        log.numerics.clamped = losses.clamped;
+        log.numerics.underflowed = losses.underflowed;
+        log.numerics.variance_floor_hits = losses.variance_floor_hits;
+        container
+    }
+}
+
+/// Saves iterations as often as a checkpoint asks for.
+struct Saver<'a> {
+    checkpoint: Option<&'a Checkpoint>,
+    identity: &'a str,
+    last: Instant,
+    /// The first failure; nothing is saved after it.
+    saved: Result<(), FileError>,
+}
+
+impl<'a> Saver<'a> {
+    fn new(checkpoint: Option<&'a Checkpoint>, identity: &'a str) -> Saver<'a> {
+        Saver { checkpoint, identity, last: Instant::now(), saved: Ok(()) }
+    }
+
+    fn save(&mut self, progress: &Iterations, volume: &Volume) {
+        if let Some(Checkpoint { path, interval, .. }) = self.checkpoint
+            && self.last.elapsed() >= *interval
+            && self.saved.is_ok()
+        {
+            self.saved = checkpoint::write(path, self.identity, progress, volume);
+            self.last = Instant::now();
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! Everything that is decided before captures are traced.
+
+use glam::Vec3;
+
+use super::circumstances::{BakeError, Circumstances};
+use super::log::Log;
+use super::memory::Memory;
+use crate::config::{Config, VISIBILITY};
+use crate::light::World;
+use crate::plan::Plan;
+use crate::probe::capture::{Capture, ProbeCapture};
+use crate::probe::lattice::ProbeState;
+use crate::probe::place::{Placement, PlacementSettings, PlacementTask, place};
+use crate::probe::store::occlusion::OcclusionBuilder;
+use crate::probe::store::{Occlusion, OcclusionStore, head_bytes};
+use crate::probe::{Grid, Volume};
+
+/// Hits this far outside the hull of the probes, in spacings, still count as inside: rounding of the bounds.
+const HULL_TOLERANCE: f32 = 1e-3;
+
+/// Everything decided before tracing the captures.
+pub struct Prepared<'w, 's> {
+    pub world: &'w World<'s>,
+    pub config: &'w Config,
+    pub grid: Grid,
+    pub placement: Placement,
+    pub plan: Plan,
+    pub survey_s: f64,
+    pub(super) memory: Memory,
+    /// Hull of the probes relative to the scene's origin, a little enlarged.
+    hull: (Vec3, Vec3),
+}
+
+/// Places the probes, surveys the surfaces and makes the plan.
+///
+/// # Errors
+/// There is no such grid, or it needs more memory than there is.
+pub fn prepare<'w, 's>(
+    world: &'w World<'s>,
+    config: &'w Config,
+    circumstances: &Circumstances,
+) -> Result<Prepared<'w, 's>, BakeError> {
+    let mut log = Log::new(circumstances.progress);
+    let grid = Grid::new(&config.grid, world.scene)?;
+    let memory = Memory::of(config, &grid, &world.scene.mesh);
+    memory.check(config, 0)?;
+    let keep_unsampled = config.placement.keep_unsampled || config.plan.keeps("unused_probes");
+    let settings = PlacementSettings { keep_unsampled, ..config.placement.clone() };
+    let task = PlacementTask {
+        grid: &grid,
+        settings: &settings,
+        occlusion: &config.store.occlusion,
+        reach: config.query.reach(),
+        seed: circumstances.seed,
+    };
+    let placement =
+        log.stage(|times| &mut times.survey, "placing", 1, |bar| place(world, &task, || bar.set_prefix("surveying")));
+    let plan = Plan::new(world, config, &grid, &placement);
+    let hull = grid.hull(HULL_TOLERANCE);
+    Ok(Prepared { world, config, grid, placement, plan, survey_s: log.times.survey, memory, hull })
+}
+
+impl Prepared<'_, '_> {
+    pub(super) fn capture<'a>(&'a self, circumstances: &Circumstances) -> Capture<'a, 'a> {
+        let clamp = self.config.store.occlusion.distance_clamp().filter(|_| self.stores_occlusion());
+        Capture {
+            world: self.world,
+            settings: &self.config.capture,
+            distance_clamp_m: clamp.map(|diagonals| diagonals * self.grid.spacing().length()),
+            hit_light: self.config.transport.hit_light(),
+            emitter_coverage: self.placement.emitter_coverage,
+            seed: circumstances.seed,
+        }
+    }
+
+    /// Whether the plan or the configuration keeps what the method knows about occlusion.
+    pub(super) fn stores_occlusion(&self) -> bool {
+        self.plan.visibility || self.config.plan.keeps(VISIBILITY)
+    }
+
+    /// What collects occlusion while probes are captured.
+    pub(super) fn occlusion_builder(&self) -> OcclusionBuilder {
+        let (store, probes) = (&self.config.store, self.grid.probe_count());
+        let occlusion = if self.stores_occlusion() { &store.occlusion } else { &OcclusionStore::None };
+        let directions = self.config.capture.rays.directions();
+        occlusion.builder(self.placement.survey.as_ref(), &directions, probes, store.border)
+    }
+
+    pub(super) fn active(&self) -> Vec<usize> {
+        let states = &self.placement.states;
+        (0..states.len()).filter(|&p| states[p] == ProbeState::Active).collect()
+    }
+
+    /// Traces one active probe.
+    pub(super) fn trace(&self, capture: &Capture, probe: usize) -> ProbeCapture {
+        let position = self.placement.positions[probe];
+        let (low, high) = self.hull;
+        capture.probe(probe, position, |p| p.cmpge(low).all() && p.cmple(high).all())
+    }
+
+    /// The volume before any light is in it.
+    pub(super) fn volume(&self, occlusion: Occlusion) -> Volume {
+        let store = &self.config.store;
+        Volume {
+            positions: self.placement.positions.clone(),
+            states: self.placement.states.clone(),
+            irradiance: store.irradiance.zeros(self.grid.probe_count(), store.border),
+            occlusion,
+            grid: self.grid.clone(),
+        }
+    }
+
+    /// Bytes per probe in the layout that shading uses: in full, and after the plan.
+    pub(super) fn runtime_bytes(&self) -> (f64, f64) {
+        let (store, probes) = (&self.config.store, self.grid.probe_count());
+        let head = head_bytes(self.config.placement.rule.moves()) + store.irradiance.runtime_bytes(store.border);
+        let survey = self.placement.survey.as_ref();
+        let full = head as f64 + store.occlusion.runtime_bytes(store.border, survey, probes);
+        (full, if self.plan.visibility { full } else { head as f64 })
+    }
+}

@@ -1,0 +1,41 @@
+//! What placement is asked for, and what it gives.
+
+use glam::Vec3;
+
+use super::settings::PlacementSettings;
+use crate::probe::lattice::{Grid, ProbeState};
+use crate::probe::store::OcclusionStore;
+use crate::probe::store::surface::SurfaceVisibility;
+
+/// The probes before they are captured.
+#[derive(Debug, Clone)]
+pub struct Placement {
+    pub states: Vec<ProbeState>,
+    /// Relative to the scene's origin, metres.
+    pub positions: Vec<Vec3>,
+    /// Whether any surface lies in the probe's cells.
+    pub sampled: Vec<bool>,
+    /// Probes moved from their grid points.
+    pub relocated: usize,
+    /// Share of the active probes' rays that end on an emitting surface or in the sky.
+    pub emitter_coverage: f32,
+    /// What surfaces see of their probes; `None` where the method does not ask.
+    pub survey: Option<SurfaceVisibility>,
+    pub rays: u64,
+}
+
+/// What placement looks at besides the scene.
+pub struct PlacementTask<'a> {
+    pub grid: &'a Grid,
+    pub settings: &'a PlacementSettings,
+    pub occlusion: &'a OcclusionStore,
+    /// How far from a surface, in spacings, it may look probes up.
+    pub reach: f32,
+    pub seed: u64,
+}
+
+impl Placement {
+    pub fn count(&self, state: ProbeState) -> usize {
+        self.states.iter().filter(|&&s| s == state).count()
+    }
+}

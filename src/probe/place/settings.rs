@@ -1,0 +1,163 @@
+//! What a method says about placing its probes.
+
+use serde::{Deserialize, Serialize};
+
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PlacementSettings {
+    pub rule: PlacementRule,
+    /// Bake probes that no surface can sample, for objects that move through the air.
+    pub keep_unsampled: bool,
+    pub survey: SurveySettings,
+}
+
+/// How a probe comes from its grid point to its place.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PlacementRule {
+    /// It stays there, and counts wherever that is.
+    GridPoints,
+    /// It moves into the open, and to surfaces that see no probe.
+    Settle(SettleSettings),
+}
+
+impl Default for PlacementRule {
+    fn default() -> Self {
+        PlacementRule::Settle(SettleSettings::default())
+    }
+}
+
+impl PlacementRule {
+    /// Whether probes may stand elsewhere than at their grid points.
+    pub fn moves(&self) -> bool {
+        match self {
+            PlacementRule::GridPoints => false,
+            PlacementRule::Settle(settings) => settings.relocate,
+        }
+    }
+
+    /// Calls `rule(key, value, holds, rule)` for every number in it.
+    pub fn check(&self, rule: &mut dyn FnMut(&'static str, String, bool, &'static str)) {
+        match self {
+            PlacementRule::GridPoints => {}
+            PlacementRule::Settle(settings) => settings.check(rule),
+        }
+    }
+}
+
+/// Lengths are in spacings: the smallest of the grid's three.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SettleSettings {
+    /// Rays that decide about one probe.
+    pub rays: u32,
+    /// A probe counts as inside geometry (or outside the world) when more than this share of what its rays meet are
+    /// backs of surfaces, 0 to 1. Beside a sheet that has only a front nearly half of them are.
+    pub back_face_share: f32,
+    /// Move probes that are inside geometry, or touch it, into the open where it is near.
+    pub relocate: bool,
+    /// Farthest that a probe is moved from its grid point. Beyond half a spacing it would be nearer to a neighbour's place
+    /// than to its own; 0.45 is the bound of Majercik et al. 2021.
+    pub max_move: f32,
+    /// Nearer to a surface than this, a probe is moved away from it: the surface would fill 47 % of what it sees of a wall
+    /// one spacing wide.
+    pub min_clearance: f32,
+    /// How far from a surface a moved probe comes to lie: more than `min_clearance`, so that it is not moved again, and
+    /// less than the 0.125 that a voxel of the default table is wide, so that the surface's own voxels see it.
+    pub clearance: f32,
+    /// Moves tried before a probe stays as it was.
+    pub max_moves: u32,
+    /// How far from a surface that sees no probe one is put; half the free space where that is less.
+    pub need_distance: f32,
+    /// Surfaces in need tried for one probe, nearest first.
+    pub need_tries: u32,
+}
+
+impl Default for SettleSettings {
+    fn default() -> Self {
+        SettleSettings {
+            rays: 128,
+            back_face_share: 0.5,
+            relocate: true,
+            max_move: 0.45,
+            min_clearance: 0.05,
+            clearance: 0.12,
+            max_moves: 4,
+            need_distance: 0.2,
+            need_tries: 12,
+        }
+    }
+}
+
+impl SettleSettings {
+    /// Calls `rule(key, value, holds, rule)` for every number in it.
+    pub fn check(&self, rule: &mut dyn FnMut(&'static str, String, bool, &'static str)) {
+        rule("placement.rule.settle.rays", self.rays.to_string(), (1..=65_536).contains(&self.rays), "use 1 to 65536");
+        for (key, value) in [
+            ("placement.rule.settle.back_face_share", self.back_face_share),
+            ("placement.rule.settle.max_move", self.max_move),
+            ("placement.rule.settle.min_clearance", self.min_clearance),
+            ("placement.rule.settle.clearance", self.clearance),
+            ("placement.rule.settle.need_distance", self.need_distance),
+        ] {
+            rule(key, value.to_string(), (0.0..=1.0).contains(&value), "use a number from 0 to 1");
+        }
+        for (key, value) in
+            [("placement.rule.settle.max_moves", self.max_moves), ("placement.rule.settle.need_tries", self.need_tries)]
+        {
+            rule(key, value.to_string(), value <= 1024, "use 0 to 1024");
+        }
+    }
+}
+
+/// How closely surfaces are looked at.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SurveySettings {
+    /// Points tried on a surface within one voxel at first.
+    pub first_points: u32,
+    /// Points tried in all where the first ones disagree.
+    pub all_points: u32,
+    /// Points tried on the outside of a surface until one sees any probe: where walls meet, most of a voxel's surface may
+    /// lie inside the other wall, and the strip that does not must still be found.
+    pub search_points: u32,
+    /// Most search points on all triangles of a voxel's side together, as far as each still gets `all_points`/2: finely
+    /// divided surfaces need no more points than a wall of two triangles does.
+    pub group_search_points: u32,
+    /// Voxels are taken larger by this share of their side on every side when surfaces are sorted into them, so that a
+    /// surface on the border of two is known in both, on whichever side of it rounding puts the point that asks.
+    pub voxel_margin: f32,
+    /// Layers of probes around a cell that are searched for a probe where a surface sees none of its eight.
+    pub far_rings: u32,
+}
+
+impl Default for SurveySettings {
+    fn default() -> Self {
+        SurveySettings {
+            first_points: 2,
+            all_points: 8,
+            search_points: 32,
+            group_search_points: 128,
+            voxel_margin: 0.03,
+            far_rings: 3,
+        }
+    }
+}
+
+impl SurveySettings {
+    /// Calls `rule(key, value, holds, rule)` for every number in it.
+    pub fn check(&self, rule: &mut dyn FnMut(&'static str, String, bool, &'static str)) {
+        for (key, value) in [
+            ("placement.survey.first_points", self.first_points),
+            ("placement.survey.all_points", self.all_points),
+            ("placement.survey.search_points", self.search_points),
+            ("placement.survey.group_search_points", self.group_search_points),
+        ] {
+            // Votes are counted in 8 bits.
+            rule(key, value.to_string(), (1..=255).contains(&value), "use 1 to 255");
+        }
+        let margin = self.voxel_margin;
+        rule("placement.survey.voxel_margin", margin.to_string(), (0.0..=0.5).contains(&margin), "use 0 to 0.5");
+        rule("placement.survey.far_rings", self.far_rings.to_string(), self.far_rings <= 16, "use 0 to 16");
+    }
+}

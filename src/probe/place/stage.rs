@@ -1,0 +1,53 @@
+//! The stage: settle → survey → need.
+
+use super::need;
+use super::placement::{Placement, PlacementTask};
+use super::settings::PlacementRule;
+use super::settle::{Settler, settle_all};
+use super::survey::Survey;
+use crate::light::World;
+use crate::probe::lattice::{Grid, ProbeState};
+use crate::probe::store::surface::SurfaceVisibility;
+use crate::scene::Mesh;
+
+/// Places every probe of the grid and surveys the surfaces; `surveying` is called in between.
+pub fn place(world: &World, task: &PlacementTask, surveying: impl FnOnce()) -> Placement {
+    let PlacementTask { grid, settings, occlusion, .. } = *task;
+    let mut placement = settle_all(world, task);
+    surveying();
+    let Some(voxels) = occlusion.survey_voxels() else { return placement };
+    let survey = |placement: &mut Placement| {
+        let survey = Survey::run(world, grid, placement, voxels, &settings.survey, task.seed);
+        placement.rays += survey.rays;
+        survey
+    };
+    let mut found = survey(&mut placement);
+    if let PlacementRule::Settle(rule) = &settings.rule
+        && rule.relocate
+        && need::relocate(&Settler { world, grid, settings: rule }, &mut placement, &found) > 0
+    {
+        found = survey(&mut placement);
+    }
+    let mut table = found.table;
+    // Only where shading asks this very table does it need a probe for every entry, and does a probe that no surface sees
+    // weigh nothing.
+    if occlusion.keeps_survey() {
+        table.far = need::far_probes(world, grid, &placement, &table, &settings.survey);
+        if !settings.keep_unsampled {
+            retire_unseen(&world.scene.mesh, grid, &mut placement, &table);
+        }
+    }
+    placement.survey = Some(table);
+    placement
+}
+
+/// Active probes that no surface sees are not worth baking.
+fn retire_unseen(mesh: &Mesh, grid: &Grid, placement: &mut Placement, table: &SurfaceVisibility) {
+    let mut seen = need::seen_probes(mesh, grid, placement, table, |_| true);
+    table.far.iter().for_each(|&(_, probe)| seen[probe as usize] = true);
+    for (state, seen) in placement.states.iter_mut().zip(seen) {
+        if *state == ProbeState::Active && !seen {
+            *state = ProbeState::NeverSampled;
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! The look-up itself.
+
+use glam::{Vec2, Vec3, Vec3A};
+
+use super::corner_test::{CornerTest, Mask, MomentsTest, SurfaceTest};
+use super::point::{BatchVisibility, CornerWeights, QueryPoint, Visibility};
+use super::settings::{QuerySettings, VisibilityTest};
+use crate::math::octahedral::oct_from_direction;
+use crate::probe::Volume;
+use crate::probe::lattice::grid::{Cell, ProbeIndex};
+use crate::probe::store::Occlusion;
+
+/// A volume and the way to ask it.
+#[derive(Clone, Copy)]
+pub struct Query<'v> {
+    pub volume: &'v Volume,
+    pub settings: &'v QuerySettings,
+}
+
+/// Calls `$body` with `$test` bound to the one test that the query, and the mode, ask for: the loop in it is compiled for
+/// each.
+macro_rules! with_test {
+    ($query:expr, $visibility:expr, |$test:ident| $body:expr) => {
+        match ($visibility, &$query.volume.occlusion, $query.settings.test) {
+            (Visibility::Stored, Occlusion::Moments(maps), VisibilityTest::Chebyshev { power, floor }) => {
+                let $test = MomentsTest { maps, positions: &$query.volume.positions, power, floor };
+                $body
+            }
+            (Visibility::Stored, Occlusion::Surface(table), VisibilityTest::Table(test)) => {
+                let $test = SurfaceTest { table, test };
+                $body
+            }
+            (Visibility::Exact(mask), ..) => {
+                let $test = Mask(mask);
+                $body
+            }
+            (Visibility::Off | Visibility::Stored, ..) => {
+                let $test = Mask(u8::MAX);
+                $body
+            }
+        }
+    };
+}
+
+impl Query<'_> {
+    /// The shifted point P′.
+    #[inline]
+    fn biased(&self, point: &QueryPoint) -> Vec3 {
+        let bias = point.normal * self.settings.normal_bias + point.view * self.settings.view_bias;
+        point.position + bias * self.volume.grid.spacing_max()
+    }
+
+    #[inline]
+    fn cell_of(&self, point: &QueryPoint, biased: Vec3) -> Cell {
+        self.volume.grid.cell(if self.settings.biased_cell { biased } else { point.position })
+    }
+
+    /// The cell whose corners a point asks.
+    pub fn cell(&self, point: &QueryPoint) -> Cell {
+        self.cell_of(point, self.biased(point))
+    }
+
+    /// Weights of the eight probes around a point; inactive probes weigh nothing.
+    pub fn weights(&self, point: &QueryPoint, visibility: Visibility) -> CornerWeights {
+        with_test!(self, visibility, |test| self.weigh(point, &test))
+    }
+
+    /// Which corners of its cell the stored table says that a point sees, where it is all the test there is: it then needs to
+    /// be looked up only once. 0 where it says none, or there is more to the test.
+    pub fn stored_mask(&self, point: &QueryPoint) -> u8 {
+        match (&self.volume.occlusion, self.settings.test) {
+            (Occlusion::Surface(table), VisibilityTest::Table(test)) => {
+                let biased = self.biased(point);
+                SurfaceTest { table, test }.seen(&self.volume.grid, &self.cell_of(point, biased), point, biased).mask
+            }
+            _ => 0,
+        }
+    }
+
+    #[inline]
+    fn weigh(&self, point: &QueryPoint, test: &impl CornerTest) -> CornerWeights {
+        let (volume, settings) = (self.volume, self.settings);
+        let grid = &volume.grid;
+        let biased = self.biased(point);
+        let cell = self.cell_of(point, biased);
+        let seen = test.seen(grid, &cell, point, biased);
+        let mut out = CornerWeights { probes: [ProbeIndex(0); 8], weights: [0.0; 8] };
+        if let Some(far) = seen.far {
+            out.probes[0] = far;
+            out.weights[0] = 1.0;
+            return out;
+        }
+        for i in 0..8 {
+            let probe = grid.corner(&cell, i);
+            out.probes[i as usize] = probe;
+            let trilinear = floored_trilinear(cell.fraction, i, settings.trilinear_floor);
+            if trilinear <= 0.0 || seen.mask >> i & 1 == 0 || !volume.is_active(probe) {
+                continue;
+            }
+            let to_probe = || (volume.position(probe) - point.position).normalize_or_zero();
+            let mut weight = settings.direction.at(|| to_probe().dot(point.normal));
+            weight *= test.factor(probe, biased);
+            weight = weight.max(settings.weight_floor);
+            if weight < settings.crush_below {
+                weight *= (weight / settings.crush_below).powi(2);
+            }
+            out.weights[i as usize] = weight * trilinear;
+        }
+        out
+    }
+
+    /// Irradiance around the point's normal, W·m⁻²; zero where no probe counts.
+    pub fn irradiance(&self, point: &QueryPoint, visibility: Visibility) -> Vec3 {
+        self.blend(&self.weights(point, visibility), oct_from_direction(point.normal))
+    }
+
+    /// Irradiance at many points: the settings are looked at once for all.
+    ///
+    /// # Panics
+    /// When `out`, or the masks, are not as many as the points.
+    pub fn batch(&self, points: &[QueryPoint], visibility: BatchVisibility, out: &mut [Vec3]) {
+        assert_eq!(points.len(), out.len(), "a result for every point");
+        let visibility = match visibility {
+            BatchVisibility::Exact(masks) => {
+                assert_eq!(points.len(), masks.len(), "a mask for every point");
+                for ((point, &mask), out) in points.iter().zip(masks).zip(out) {
+                    *out = self.asked(point, &Mask(mask));
+                }
+                return;
+            }
+            BatchVisibility::Off => Visibility::Off,
+            BatchVisibility::Stored => Visibility::Stored,
+        };
+        with_test!(self, visibility, |test| {
+            for (point, out) in points.iter().zip(out) {
+                *out = self.asked(point, &test);
+            }
+        });
+    }
+
+    #[inline]
+    fn asked(&self, point: &QueryPoint, test: &impl CornerTest) -> Vec3 {
+        self.blend(&self.weigh(point, test), oct_from_direction(point.normal))
+    }
+
+    /// Weighted mean of the probes' irradiance around the direction `oct`.
+    #[inline]
+    pub fn blend(&self, corners: &CornerWeights, oct: Vec2) -> Vec3 {
+        let total = corners.total();
+        if total <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let irradiance = &self.volume.irradiance;
+        // One direction serves all eight probes.
+        let around = irradiance.around(oct);
+        let per_total = 1.0 / total;
+        let mut sum = Vec3A::ZERO;
+        for (probe, weight) in corners.probes.iter().zip(corners.weights) {
+            if weight > 0.0 {
+                let irradiance = irradiance.at(probe.0 as usize, &around);
+                sum += self.settings.blend.forward(irradiance) * (weight * per_total);
+            }
+        }
+        self.settings.blend.backward(sum).into()
+    }
+}
+
+/// Trilinear weight of corner `i`, no axis below `floor`; without a floor the eight sum to 1.
+#[inline]
+fn floored_trilinear(fraction: Vec3, i: u32, floor: f32) -> f32 {
+    let along = |bit: u32, f: f32| (if i >> bit & 1 == 1 { f } else { 1.0 - f }).max(floor);
+    along(0, fraction.x) * along(1, fraction.y) * along(2, fraction.z)
+}

@@ -1,0 +1,53 @@
+//! What asks, and which weights it gets.
+
+use glam::Vec3;
+
+use crate::probe::lattice::ProbeIndex;
+use crate::probe::store::surface::Facing;
+
+/// A point that asks for irradiance.
+#[derive(Debug, Clone, Copy)]
+pub struct QueryPoint {
+    /// Relative to the scene's origin, metres.
+    pub position: Vec3,
+    /// Shading normal, unit: irradiance is asked for around it.
+    pub normal: Vec3,
+    /// Of the geometric normal on the viewer's side.
+    pub facing: Facing,
+    /// Unit, towards the viewer; in the bake towards the probe.
+    pub view: Vec3,
+}
+
+/// Where the visibility factor comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Visibility {
+    /// 1 for every probe.
+    Off,
+    /// What the method stores.
+    Stored,
+    /// Bit i: whether corner i of the point's cell, see [`Query::cell`](super::Query::cell), is visible.
+    Exact(u8),
+}
+
+/// [`Visibility`] of many points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BatchVisibility<'m> {
+    Off,
+    Stored,
+    /// A mask for every point.
+    Exact(&'m [u8]),
+}
+
+/// The eight probes of a point, in the order of [`Grid::corner`](crate::probe::Grid::corner), with their weights, not normalised.
+#[derive(Debug, Clone, Copy)]
+pub struct CornerWeights {
+    pub probes: [ProbeIndex; 8],
+    pub weights: [f32; 8],
+}
+
+impl CornerWeights {
+    #[inline]
+    pub fn total(&self) -> f32 {
+        self.weights.iter().sum()
+    }
+}

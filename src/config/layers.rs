@@ -225,7 +225,13 @@ fn alone(path: &str, value: &str) -> Result<Config, SpannedError> {
     let parse = |choices: usize| ron_options().from_str::<Config>(&text(choices));
     // The first key is a section, and what a choice stands before is in parentheses.
     let mut best: Option<SpannedError> = None;
-    for choices in (0..1usize << keys.len().min(8)).filter(|choices| choices & 1 == 0) {
+    // Choices stand before settings in parentheses: those of a field, or the value's own.
+    let last = keys.len().min(8);
+    let fits = |choices: usize| {
+        let followed = |i: usize| if i + 1 < last { choices >> (i + 1) & 1 == 0 } else { value.starts_with('(') };
+        (0..last).all(|i| choices >> i & 1 == 0 || i > 0 && followed(i))
+    };
+    for choices in (0..1usize << last).filter(|&choices| fits(choices)) {
         match parse(choices) {
             Ok(config) => return Ok(config),
             // Who gets as far as the value knows best what is wrong with it.

@@ -61,7 +61,8 @@ impl World {
         let operator = Operator { captures: &self.captures, kernel: &kernel, query: &query, gathers_emission };
         let solution = run(transport, &operator, &mut self.volume, Progress::default(), |_, _| {});
         let values: Vec<f32> = self.volume.irradiance.probe(0).map(|e| e.x).collect();
-        assert!(values.iter().all(|e| (e / values[0] - 1.0).abs() < 1e-5), "{values:?}");
+        // Albedos of texels are dithered.
+        assert!(values.iter().all(|e| (e / values[0] - 1.0).abs() < 1e-4), "{values:?}");
         (values[0], solution)
     }
 }

@@ -223,7 +223,6 @@ fn alone(path: &str, value: &str) -> Result<Config, SpannedError> {
         })
     };
     let parse = |choices: usize| ron_options().from_str::<Config>(&text(choices));
-    // The first key is a section, and what a choice stands before is in parentheses.
     let mut best: Option<SpannedError> = None;
     // Choices stand before settings in parentheses: those of a field, or the value's own.
     let last = keys.len().min(8);

@@ -5,9 +5,10 @@ use std::path::Path;
 
 use gltf::json::{Buffer, Index, buffer::View};
 
-use super::document::{Document, label};
+use super::document::Document;
 use super::extensions::{COMPRESSED_GEOMETRY, remedy};
 use super::inputs::{Inputs, Resource, resolve};
+use super::text::label;
 use crate::scene::error::{RE_EXPORT, SceneError};
 
 /// Content of every buffer of the file; `None` for those that have none (placeholders of compressed geometry).

@@ -14,6 +14,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
 use super::extensions;
+use super::text::sentence;
 use crate::scene::error::{RE_EXPORT, SceneError};
 
 /// No real scene comes near; a JSON list of `{}` grows a hundredfold when parsed into typed elements.
@@ -101,31 +102,6 @@ impl Document {
             self.invalid(place.to_string(), what, RE_EXPORT)
         })
     }
-}
-
-/// `kind index 'name'`, safe to print on one line.
-pub(super) fn label(kind: &str, index: usize, name: Option<&str>) -> String {
-    match name {
-        None | Some("") => format!("{kind} {index}"),
-        Some(name) => format!("{kind} {index} '{}'", short(name)),
-    }
-}
-
-/// A name as it may stand in a one-line message.
-pub(super) fn short(name: &str) -> String {
-    const MAX_CHARS: usize = 60;
-    let cut: String = name.chars().take(MAX_CHARS).collect();
-    let dots = if cut.len() < name.len() { "…" } else { "" };
-    format!("{}{dots}", cut.escape_debug())
-}
-
-/// A message from a parser or decoder, on one line; a long one ends after a whole word.
-pub(super) fn sentence(message: &str) -> String {
-    const MAX_CHARS: usize = 240;
-    let line = message.split_whitespace().collect::<Vec<_>>().join(" ");
-    let Some((end, _)) = line.char_indices().nth(MAX_CHARS) else { return line.escape_debug().to_string() };
-    let kept = line[..end].rsplit_once(' ').map_or(&line[..end], |(kept, _)| kept);
-    format!("{} …", kept.escape_debug())
 }
 
 #[derive(serde::Deserialize)]

@@ -8,7 +8,7 @@ use gltf::json::Node;
 use super::buffers::Buffers;
 use super::document::Document;
 use super::nodes::{Nodes, node_label};
-use super::places::{instances, skeleton};
+use super::places::{Place, instances, skeleton};
 use super::primitive::{self, Primitive, Size, Skipped};
 use super::transform::{Placement, WorldPoint};
 use crate::scene::error::{RE_EXPORT, SceneError};
@@ -18,12 +18,6 @@ pub(super) struct Draw {
     /// Index into [`Draws::primitives`].
     pub primitive: usize,
     pub place: Place,
-}
-
-pub(super) enum Place {
-    Rigid(Placement),
-    /// Index into [`Draws::skeletons`].
-    Skinned(usize),
 }
 
 /// Everything that is drawn.

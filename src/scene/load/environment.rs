@@ -7,8 +7,8 @@ use glam::Vec3;
 use image::codecs::hdr::HdrDecoder;
 use image::{DynamicImage, ImageDecoder};
 
-use super::document::sentence;
 use super::inputs::Inputs;
+use super::text::sentence;
 use crate::scene::environment::{Environment, EnvironmentMap};
 use crate::scene::error::SceneError;
 use crate::scene::options::EnvironmentSource;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::{Map, Value};
 
-use super::document::short;
+use super::text::short;
 use crate::scene::error::SceneError;
 
 /// Extensions whose meaning the loader carries out.

@@ -6,7 +6,7 @@
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::draws::Draws;
-use super::places::Poses;
+use super::poses::Poses;
 use super::primitive::Primitive;
 use super::transform::{Pose, WorldPoint, is_mirrored, normal_matrix};
 use crate::scene::{DroppedTriangles, MaterialIndex, Mesh};

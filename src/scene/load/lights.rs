@@ -8,8 +8,9 @@ use gltf::json::extensions::scene::khr_lights_punctual::{Light, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Camera as CameraDefinition, camera::Type as CameraType};
 
-use super::document::{Document, label, short};
+use super::document::Document;
 use super::nodes::{Nodes, node_label};
+use super::text::{label, short};
 use super::transform::{Pose, WorldPoint};
 use crate::scene::camera::Projection;
 use crate::scene::error::{RE_EXPORT, SceneError};

@@ -8,10 +8,11 @@ use gltf::json::material::AlphaMode as DefinedAlpha;
 use gltf::json::validation::Checked;
 use serde_json::Value;
 
-use super::document::{Document, label, short};
+use super::document::Document;
 use super::draws::Draws;
 use super::flatten::MaterialOf;
 use super::primitive::Primitive;
+use super::text::{label, short};
 use super::texture_slot::{Slot, slot};
 use super::textures::Textures;
 use crate::scene::error::{RE_EXPORT, SceneError};

@@ -5,7 +5,8 @@ use serde_json::Value;
 
 use gltf::json::Node;
 
-use super::document::{Document, label};
+use super::document::Document;
+use super::text::label;
 use super::transform::{Local, Placement};
 use crate::scene::error::{RE_EXPORT, SceneError};
 

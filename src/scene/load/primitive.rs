@@ -6,8 +6,9 @@ use gltf::json::validation::Checked;
 
 use super::accessor::Accessor;
 use super::buffers::Buffers;
-use super::document::{Document, label};
+use super::document::Document;
 use super::extensions::remedy;
+use super::text::label;
 use crate::scene::error::{RE_EXPORT, SceneError};
 
 /// One primitive in its own space. All attribute lists are as long as `positions`, or empty where the file gives none.

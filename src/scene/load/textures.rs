@@ -8,10 +8,11 @@ use gltf::json::validation::Checked;
 use gltf::json::{Image, Index, Texture as Definition};
 
 use super::buffers::Buffers;
-use super::document::{Document, label, sentence};
+use super::document::Document;
 use super::extensions::{COMPRESSED_IMAGES, remedy};
 use super::image::{Budget, Decoded, Failure};
 use super::inputs::{Inputs, Resource, resolve};
+use super::text::{label, sentence};
 use crate::scene::error::{RE_EXPORT, SceneError};
 use crate::scene::material::{Texels, Texture, TextureIndex, Wrap};
 

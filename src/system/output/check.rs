@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::{OutputError, folder_of, link_target};
+use super::error::{OutputError, missing_folder};
+use super::paths::{folder_of, link_target};
 
 /// A path with the flag or argument that gave it, such as `--report`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -86,15 +87,6 @@ fn check_permission(path: &Path, folder: &Path) -> Result<(), OutputError> {
         }
         // What else there may be shows when the file is written.
         _ => Ok(()),
-    }
-}
-
-/// Why a file cannot be written into a folder that is none.
-pub(super) fn missing_folder(path: &Path, folder: &Path) -> OutputError {
-    let path = path.to_owned();
-    match folder.ancestors().find(|part| part.exists() && !part.is_dir()) {
-        Some(blocker) => OutputError::NoSuchFolder { path, blocker: blocker.to_owned() },
-        None => OutputError::NoFolder { path, folder: folder.to_owned() },
     }
 }
 

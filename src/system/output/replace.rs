@@ -8,7 +8,9 @@ use std::path::{Path, PathBuf};
 use nix::errno::Errno;
 use nix::fcntl::{AT_FDCWD, RenameFlags, renameat2};
 
-use super::{OutputError, TEMPORARY_PREFIX, folder_of, link_target, output_error, write_atomically};
+use super::error::{OutputError, output_error};
+use super::paths::{folder_of, link_target};
+use super::write::{TEMPORARY_PREFIX, write_atomically};
 
 /// Beside a folder: the one that takes its place, and, only where the two cannot be exchanged at once, itself in between.
 const NEW: &str = "new";

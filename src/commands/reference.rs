@@ -18,7 +18,7 @@ use crate::math::blocks::BLOCK;
 use crate::report::header::Header;
 use crate::report::reference::{NoiseReport, Rays, ReferenceReport, ReferenceTimes, SCHEMA};
 use crate::report::table::{Column, Table};
-use crate::shade::film::Noise;
+use crate::shade::film::NoiseLevel;
 use crate::shade::points::has_blend;
 use crate::shade::reference::{ReferenceSettings, State, Tracing};
 use crate::shade::reference_file::{Identity, resume};
@@ -186,7 +186,7 @@ pub(super) fn trace(tracing: &mut Tracing, path: &Path, identity: &Identity, con
     Ok((started.elapsed() - saving).as_secs_f64())
 }
 
-fn noise_report(noise: Noise) -> NoiseReport {
+fn noise_report(noise: NoiseLevel) -> NoiseReport {
     NoiseReport {
         mean: noise.mean,
         mean_standard_error: noise.mean_standard_error,

@@ -24,8 +24,8 @@ use crate::probe::query::Query;
 use crate::report::header::Header;
 use crate::report::render::{RenderReport, RenderTimes, SCHEMA};
 use crate::scene::{Camera, Scene};
-use crate::shade::methods::Method;
 use crate::shade::points::see;
+use crate::shade::visibility_modes::VisibilityMode;
 use crate::system::output::{Named, create_folder};
 
 /// What all cameras of a run share.
@@ -146,7 +146,7 @@ fn folder_name(camera: &str) -> String {
 fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderReport> {
     let (args, volume) = (run.args, run.volume);
     let query = Query { volume, settings: &run.config.query };
-    let bar = run.console.progress.stage("rendering", 2 + Method::ALL.len());
+    let bar = run.console.progress.stage("rendering", 2 + VisibilityMode::ALL.len());
     let primary_started = Instant::now();
     let view = see(run.world, camera, args.view.size.width, args.view.size.height, args.trace.seed);
     let primary_s = primary_started.elapsed().as_secs_f64();
@@ -158,7 +158,7 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
     // What is left of the error when the probes are right and visibility exact comes from interpolation between probes.
     let mut path_traced = run.truth.as_ref().map(|BakedTruth { truth, .. }| {
         let query = Query { volume: &truth.volume, settings: &run.config.query };
-        scenery.shade_again(&query, &masks, Method::Ray, PATH_RAY, &shaded[2].report)
+        scenery.shade_again(&query, &masks, VisibilityMode::Ray, PATH_RAY, &shaded[2].report)
     });
     let baked = run.truth.as_ref().map(|t| t.report.clone());
     for s in &mut shaded {
@@ -171,7 +171,7 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
     if let Some(reference) = &reference {
         let Reference { layers, regions, glossy, .. } = reference;
         let comparison = Comparison { layers, regions, glossy: *glossy, exposure_ev, seed: args.trace.seed };
-        let bar = run.console.progress.stage("comparing", Method::ALL.len());
+        let bar = run.console.progress.stage("comparing", VisibilityMode::ALL.len());
         for s in shaded.iter_mut().chain(&mut path_traced) {
             s.compare(&comparison);
             bar.inc(1);

@@ -9,7 +9,7 @@ use glam::{Vec2, Vec3};
 use super::World;
 use super::emitters::{LightSample, Receiver};
 use super::surface::SurfacePoint;
-use crate::math::random::{Random, Spread};
+use crate::math::random::{KroneckerSequence, Random};
 use crate::math::sampling::{cosine_hemisphere, cosine_hemisphere_density};
 use crate::trace::Ray;
 
@@ -82,7 +82,7 @@ impl World<'_> {
                 sum += radiance * (cosine / density);
             }
         }
-        for bits in Spread::new(random).take(allocation.light as usize) {
+        for bits in KroneckerSequence::new(random).take(allocation.light as usize) {
             if let Some(sample) = self.emitters.irradiance_sample(self.scene, &receiver, counts, bits) {
                 rays.shadow += 1;
                 let ray = match sample.target {

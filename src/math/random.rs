@@ -69,25 +69,25 @@ pub fn unit_from_bits(bits: u32) -> f32 {
 /// 1/φ₄, φ₄ the positive root of x⁵ = x + 1 (Roberts, *The Unreasonable Effectiveness of Quasirandom Sequences*, 2018),
 /// in units of 2⁻³², where wrapping around is free. Each point for itself is uniform.
 #[derive(Debug, Clone)]
-pub struct Spread([u32; 4]);
+pub struct KroneckerSequence([u32; 4]);
 
-impl Spread {
+impl KroneckerSequence {
     /// 2³²·φ₄⁻¹ … 2³²·φ₄⁻⁴.
     const STEP: [u32; 4] = [3_679_390_609, 3_152_041_523, 2_700_274_806, 2_313_257_605];
 
-    pub fn new(random: &mut Random) -> Spread {
-        Spread(std::array::from_fn(|_| random.bits()))
+    pub fn new(random: &mut Random) -> KroneckerSequence {
+        KroneckerSequence(std::array::from_fn(|_| random.bits()))
     }
 }
 
-impl Iterator for Spread {
+impl Iterator for KroneckerSequence {
     type Item = [u32; 4];
 
     /// Endless.
     #[inline]
     fn next(&mut self) -> Option<[u32; 4]> {
         let point = self.0;
-        self.0 = std::array::from_fn(|i| point[i].wrapping_add(Spread::STEP[i]));
+        self.0 = std::array::from_fn(|i| point[i].wrapping_add(KroneckerSequence::STEP[i]));
         Some(point)
     }
 }

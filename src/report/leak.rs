@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 use super::reference_layers::ReferenceLayers;
 use crate::math::color::luminance;
 use crate::probe::query::Query;
-use crate::shade::methods::Method;
 use crate::shade::points::ImagePoint;
+use crate::shade::visibility_modes::VisibilityMode;
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Leak {
@@ -68,7 +68,7 @@ pub fn measure(
     query: &Query,
     points: &[ImagePoint],
     masks: &[u8],
-    method: Method,
+    mode: VisibilityMode,
     irradiance: &[Vec3],
     exact: &[Vec3],
 ) -> Leak {
@@ -77,7 +77,7 @@ pub fn measure(
     let (mut hidden_weight, mut seen, mut unseen) = (0.0f64, 0.0f64, 0.0f64);
     for (i, point) in points.iter().enumerate() {
         let share = f64::from(point.weight);
-        if query.weights(&point.query(), Method::Ray.visibility(masks[i])).total() <= 0.0 {
+        if query.weights(&point.query(), VisibilityMode::Ray.visibility(masks[i])).total() <= 0.0 {
             unseen += share;
             continue;
         }
@@ -87,7 +87,7 @@ pub fn measure(
         dark += (e_exact - e).max(0.0) * share;
         total += e_exact * share;
 
-        let corners = query.weights(&point.query(), method.visibility(masks[i]));
+        let corners = query.weights(&point.query(), mode.visibility(masks[i]));
         let sum = f64::from(corners.total());
         for k in 0..8 {
             let weight = f64::from(corners.weights[k]) / sum;

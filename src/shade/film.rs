@@ -107,7 +107,7 @@ impl Film {
     }
 
     /// How noisy a quantity is, over pixels and channels; `None` without two blocks.
-    pub fn noise(&self, quantity: Quantity) -> Option<Noise> {
+    pub fn noise(&self, quantity: Quantity) -> Option<NoiseLevel> {
         let offset = self.offset(quantity).filter(|_| quantity.has_scatter() && self.blocks >= 2)?;
         let n = f64::from(self.blocks);
         let channels = (3 * self.values.len() / self.stride()) as f64;
@@ -118,7 +118,7 @@ impl Film {
             error += variance.to_array().map(f64::sqrt).iter().sum::<f64>();
             squared += variance.element_sum();
         }
-        Some(Noise {
+        Some(NoiseLevel {
             mean: mean / channels,
             mean_standard_error: error / channels,
             rms_standard_error: (squared / channels).sqrt(),
@@ -161,9 +161,9 @@ impl Film {
     }
 }
 
-/// Noise of a picture, in the unit of what it shows.
+/// How noisy a picture is, in the unit of what it shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Noise {
+pub struct NoiseLevel {
     /// Mean over pixels and channels of the quantity itself.
     pub mean: f64,
     /// Mean over pixels and channels of the standard error.

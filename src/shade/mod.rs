@@ -4,10 +4,11 @@ mod develop;
 pub mod film;
 pub mod framing;
 pub mod layers;
-pub mod methods;
+
 pub mod outlook;
 pub mod points;
 pub mod reference;
 pub mod reference_file;
 pub mod regions;
 pub mod spheres;
+pub mod visibility_modes;

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 pub use super::develop::{BEAUTY_VARIANCE, IRRADIANCE_INDIRECT_VARIANCE};
 use super::develop::{FixedView, NO_POINT, develop_blended, develop_fixed, direct_radiance, quantities};
-use super::film::{Film, Noise, Quantity, add_block};
+use super::film::{Film, NoiseLevel, Quantity, add_block};
 use super::points::{ImagePoint, has_blend, see, see_pixel};
 use crate::image::LayeredImage;
 use crate::light::World;
@@ -101,7 +101,7 @@ pub struct Reference {
     /// As [`State::rays`].
     pub rays: RayCount,
     /// Of `irradiance_indirect`, from two blocks on.
-    pub noise: Option<Noise>,
+    pub noise: Option<NoiseLevel>,
     /// `None` for a part of a block.
     pub state: Option<State>,
 }
@@ -157,7 +157,7 @@ pub fn trace(
     tracing.develop()
 }
 
-impl Noise {
+impl NoiseLevel {
     /// For progress bars.
     pub fn to_message(&self) -> String {
         format!("noise {:.3} %", 100.0 * self.mean_standard_error / self.mean.max(f64::MIN_POSITIVE))
@@ -323,7 +323,7 @@ impl<'a> Tracing<'a> {
     }
 
     /// Of `irradiance_indirect`; `None` below two blocks.
-    pub fn noise(&self) -> Option<Noise> {
+    pub fn noise(&self) -> Option<NoiseLevel> {
         self.state.film.noise(Quantity::IrradianceIndirect)
     }
 

@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use super::develop::quantities;
-use super::film::{Film, Noise};
+use super::film::{Film, NoiseLevel};
 use super::reference::{Reference, ReferenceSettings, State};
 use crate::image::{ImageError, LayeredImage};
 use crate::light::World;
@@ -134,7 +134,7 @@ impl Reference {
         let required = |name: &str| number(name).ok_or_else(|| lacks(&format!("the text '{name}'")));
         let real = |name: &str| -> Option<f64> { image.texts.get(name)?.parse().ok().filter(|x: &f64| x.is_finite()) };
         let noise = || {
-            Some(Noise {
+            Some(NoiseLevel {
                 mean: real("noise_mean")?,
                 mean_standard_error: real("noise_mean_standard_error")?,
                 rms_standard_error: real("noise_rms_standard_error")?,

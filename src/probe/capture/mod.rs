@@ -16,7 +16,7 @@ use crate::light::sampled::{Allocation, RayCount};
 use crate::light::surface::SurfacePoint;
 use crate::math::blocks::{BLOCK, Block};
 use crate::math::octahedral::{direction_and_density, oct_from_direction, solid_angle_density};
-use crate::math::random::{Purpose, Random, Spread};
+use crate::math::random::{KroneckerSequence, Purpose, Random};
 use crate::math::statistics::Moments;
 use crate::probe::capture::surfel::Surfel;
 use crate::trace::Ray;
@@ -274,7 +274,7 @@ impl Capture<'_, '_> {
     fn sample_emitters(&self, index: usize, position: Vec3, count: u32, per_texel: usize, out: &mut ProbeCapture) {
         let world = self.world;
         let mut random = Random::new(self.seed, Purpose::ProbeEmission, index as u64, 0);
-        for bits in Spread::new(&mut random).take(count as usize) {
+        for bits in KroneckerSequence::new(&mut random).take(count as usize) {
             let Some(sample) = world.emitters.sample(world.scene, position, bits) else { continue };
             if sample.radiance == Vec3::ZERO {
                 continue;

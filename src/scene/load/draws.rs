@@ -9,7 +9,7 @@ use super::buffers::Buffers;
 use super::document::Document;
 use super::nodes::{Nodes, node_label};
 use super::places::{Place, instances, skeleton};
-use super::primitive::{self, Primitive, Size, Skipped};
+use super::primitive::{self, MeshSize, Primitive, Skipped};
 use super::transform::{Placement, WorldPoint};
 use crate::scene::error::{RE_EXPORT, SceneError};
 
@@ -43,7 +43,7 @@ impl Draws {
     /// Reads the meshes of all visible nodes.
     pub fn collect(document: &Document, buffers: &Buffers, nodes: &Nodes) -> Result<Draws, SceneError> {
         let mut draws = Draws::default();
-        let mut sizes: HashMap<usize, Size> = HashMap::new();
+        let mut sizes: HashMap<usize, MeshSize> = HashMap::new();
         let mut decoded: HashMap<usize, Range<usize>> = HashMap::new();
         let mut total = Total::default();
         for &index in &nodes.visible {
@@ -55,7 +55,7 @@ impl Draws {
             let mesh_index = mesh_index.value();
             let size = match sizes.get(&mesh_index) {
                 Some(size) => *size,
-                None => *sizes.entry(mesh_index).or_insert(primitive::size(document, buffers, mesh_index, mesh)?),
+                None => *sizes.entry(mesh_index).or_insert(primitive::mesh_size(document, buffers, mesh_index, mesh)?),
             };
             total.add(document, buffers, index, size, places.len())?;
 
@@ -132,7 +132,7 @@ impl Draws {
 /// What the scene will hold once all instances are written out.
 #[derive(Default)]
 struct Total {
-    size: Size,
+    size: MeshSize,
     draws: u64,
 }
 
@@ -143,7 +143,7 @@ impl Total {
         document: &Document,
         buffers: &Buffers,
         node: usize,
-        mesh: Size,
+        mesh: MeshSize,
         places: usize,
     ) -> Result<(), SceneError> {
         let places = places as u64;
@@ -157,7 +157,7 @@ impl Total {
         {
             return Ok(());
         }
-        let Size { vertices, triangles, .. } = self.size;
+        let MeshSize { vertices, triangles, .. } = self.size;
         Err(SceneError::TooLarge {
             file: document.file.clone(),
             place: node_label(document, node),

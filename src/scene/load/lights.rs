@@ -17,12 +17,12 @@ use crate::scene::error::{RE_EXPORT, SceneError};
 use crate::scene::{Camera, LightKind, PunctualLight};
 
 /// Where stored positions are relative to: `centre` from the landmark.
-pub(super) struct Origin<'a> {
+pub(super) struct SceneOrigin<'a> {
     pub landmark: &'a WorldPoint,
     pub centre: DVec3,
 }
 
-impl Origin<'_> {
+impl SceneOrigin<'_> {
     fn position(&self, pose: &Pose) -> Vec3 {
         // + 0.0 turns −0 into +0, as for vertices.
         ((pose.offset - self.centre) + DVec3::ZERO).as_vec3()
@@ -33,7 +33,7 @@ impl Origin<'_> {
 pub(super) fn lights(
     document: &Document,
     nodes: &Nodes,
-    origin: &Origin,
+    origin: &SceneOrigin,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<PunctualLight>, SceneError> {
     let mut lights = Vec::new();
@@ -112,7 +112,7 @@ fn kind(
 pub(super) fn cameras(
     document: &Document,
     nodes: &Nodes,
-    origin: &Origin,
+    origin: &SceneOrigin,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Camera>, SceneError> {
     let mut cameras: Vec<Camera> = Vec::new();

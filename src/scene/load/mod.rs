@@ -32,7 +32,7 @@ use self::document::Document;
 use self::draws::Draws;
 use self::flatten::{Flattened, flatten};
 use self::inputs::Inputs;
-use self::lights::Origin;
+use self::lights::SceneOrigin;
 use self::materials::Materials;
 use self::nodes::Nodes;
 use self::primitive::Skipped;
@@ -81,7 +81,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
         return Err(empty(format!("all of the scene's {} triangles are degenerate", dropped.total())));
     }
 
-    let origin = Origin { landmark: &landmark, centre };
+    let origin = SceneOrigin { landmark: &landmark, centre };
     let lights = lights::lights(&document, &nodes, &origin, &mut warnings)?;
     let cameras = lights::cameras(&document, &nodes, &origin, &mut warnings)?;
     let environment = environment::load(options.environment.as_ref(), &mut inputs, &mut warnings)?;

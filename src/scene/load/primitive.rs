@@ -38,7 +38,7 @@ pub(super) struct Skipped {
 
 /// Vertices and triangles that a mesh claims, both backed by bytes of the file.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Size {
+pub(super) struct MeshSize {
     pub primitives: u64,
     pub vertices: u64,
     pub triangles: u64,
@@ -54,8 +54,13 @@ struct Opened<'a> {
 }
 
 /// How large the mesh will be once decoded.
-pub(super) fn size(document: &Document, buffers: &Buffers, index: usize, mesh: &Mesh) -> Result<Size, SceneError> {
-    let mut size = Size::default();
+pub(super) fn mesh_size(
+    document: &Document,
+    buffers: &Buffers,
+    index: usize,
+    mesh: &Mesh,
+) -> Result<MeshSize, SceneError> {
+    let mut size = MeshSize::default();
     for opened in open(document, buffers, index, mesh, &mut Skipped::default())? {
         let corners = opened.indices.as_ref().unwrap_or(&opened.positions).count as u64;
         size.primitives += 1;

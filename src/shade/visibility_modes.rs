@@ -1,4 +1,4 @@
-//! The probes' light at a picture's points: without visibility, with the method's own, and with exact rays.
+//! The probes' light at a picture's points: without visibility, with the mode's own, and with exact rays.
 
 use std::time::Instant;
 
@@ -18,30 +18,30 @@ const LOOKUP_POINTS: usize = 20_000;
 
 /// The three ways of treating visibility, in the order of the report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Method {
+pub enum VisibilityMode {
     Off,
     On,
     Ray,
 }
 
-impl Method {
-    pub const ALL: [Method; 3] = [Method::Off, Method::On, Method::Ray];
+impl VisibilityMode {
+    pub const ALL: [VisibilityMode; 3] = [VisibilityMode::Off, VisibilityMode::On, VisibilityMode::Ray];
 
     /// Name in the report and of the pictures.
     pub fn name(self) -> &'static str {
         match self {
-            Method::Off => "visibility_off",
-            Method::On => "visibility_on",
-            Method::Ray => "visibility_ray",
+            VisibilityMode::Off => "visibility_off",
+            VisibilityMode::On => "visibility_on",
+            VisibilityMode::Ray => "visibility_ray",
         }
     }
 
     /// Where a point's visibility factor comes from; `mask` is the exact one.
     pub fn visibility(self, mask: u8) -> Visibility {
         match self {
-            Method::Off => Visibility::Off,
-            Method::On => Visibility::Stored,
-            Method::Ray => Visibility::Exact(mask),
+            VisibilityMode::Off => Visibility::Off,
+            VisibilityMode::On => Visibility::Stored,
+            VisibilityMode::Ray => Visibility::Exact(mask),
         }
     }
 }
@@ -72,22 +72,18 @@ pub fn exact_masks(world: &World, query: &Query, points: &[ImagePoint]) -> Vec<u
 }
 
 /// Irradiance at every point, W·m⁻².
-pub fn irradiance(query: &Query, points: &[ImagePoint], masks: &[u8], method: Method) -> Vec<Vec3> {
-    points
-        .par_iter()
-        .zip(masks)
-        .map(|(point, &mask)| query.irradiance(&point.query(), method.visibility(mask)))
-        .collect()
+pub fn irradiance(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<Vec3> {
+    points.par_iter().zip(masks).map(|(point, &mask)| query.irradiance(&point.query(), mode.visibility(mask))).collect()
 }
 
 /// Milliseconds that querying and shading all points took, one entry a run.
-pub fn time_shading(query: &Query, points: &[ImagePoint], masks: &[u8], method: Method) -> Vec<f64> {
+pub fn time_shading(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<f64> {
     let mut radiance = vec![Vec3::ZERO; points.len()];
     (0..RUNS)
         .map(|_| {
             let started = Instant::now();
             radiance.par_iter_mut().zip(points.par_iter().zip(masks)).for_each(|(out, (point, &mask))| {
-                let indirect = query.irradiance(&point.query(), method.visibility(mask));
+                let indirect = query.irradiance(&point.query(), mode.visibility(mask));
                 *out = super::layers::beauty(point, indirect);
             });
             std::hint::black_box(&radiance);
@@ -97,12 +93,12 @@ pub fn time_shading(query: &Query, points: &[ImagePoint], masks: &[u8], method: 
 }
 
 /// Nanoseconds of one look-up on one thread; `None` without points.
-pub fn time_lookup(query: &Query, points: &[ImagePoint], masks: &[u8], method: Method) -> Option<f64> {
+pub fn time_lookup(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Option<f64> {
     let step = points.len().div_ceil(LOOKUP_POINTS).max(1);
     let chosen: Vec<_> = points.iter().zip(masks).step_by(step).map(|(p, &mask)| (p.query(), mask)).collect();
     let started = Instant::now();
     for (point, mask) in &chosen {
-        std::hint::black_box(query.irradiance(point, method.visibility(*mask)));
+        std::hint::black_box(query.irradiance(point, mode.visibility(*mask)));
     }
     (!chosen.is_empty()).then(|| started.elapsed().as_secs_f64() * 1e9 / chosen.len() as f64)
 }

@@ -4,14 +4,20 @@ use std::fs::{self, File};
 use std::io;
 use std::path::Path;
 
-/// Content of a regular file. Pipes and devices are refused before they are opened: one may wait for its other end for
-/// ever, the other may never end.
+/// Content of a regular file.
+///
+/// # Errors
+/// Those of the disk, and any file that is not regular. Pipes and devices are refused before they are opened, because
+/// opening a pipe can wait forever and reading a device can go on forever.
 pub fn read_file(path: &Path) -> io::Result<Vec<u8>> {
     check_regular(path)?;
     fs::read(path)
 }
 
-/// The same for what reads a file piece by piece.
+/// Opens a regular file, for callers that read it piece by piece.
+///
+/// # Errors
+/// As those of [`read_file`].
 pub fn open_file(path: &Path) -> io::Result<File> {
     check_regular(path)?;
     File::open(path)

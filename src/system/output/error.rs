@@ -1,4 +1,4 @@
-//! What can go wrong with outputs, before and while they are written.
+//! Errors of output files, before and while they are written.
 
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};

@@ -19,16 +19,18 @@ pub(super) const TEMPORARY_PREFIX: &str = ".lightprobe-";
 /// What a writer writes into. It can seek, which the table of offsets in an EXR file needs.
 pub type OutputFile<'a> = BufWriter<&'a mut File>;
 
-/// Writes `path` by way of a temporary file in the same folder, which is synced to the disk and then renamed: readers see the
-/// old file or the new one, never a part. An existing file is replaced; through a symbolic link, the file it points to.
+/// Writes `path` through a temporary file in the same folder. The temporary file is synced to the disk and then renamed,
+/// so readers see the old file or the new one and never a part. An existing file is replaced. If `path` is a symbolic
+/// link, the file behind it is replaced and the link stays.
 ///
 /// # Errors
-/// Those of the disk, and whatever error `write` returns; in each case the temporary file is removed and `path` untouched.
+/// Those of the disk, and the error that `write` returns. In each case the temporary file is removed and `path` keeps
+/// its content.
 pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut OutputFile<'_>) -> io::Result<()>,
 ) -> Result<(), OutputError> {
-    // A rename over /dev/null or a pipe would replace the device by a file.
+    // Renaming onto /dev/null or a pipe would replace it by a file.
     if fs::metadata(path).is_ok_and(|existing| !existing.is_file()) {
         return Err(OutputError::NotAFile { path: path.to_owned() });
     }
@@ -46,14 +48,15 @@ pub fn write_atomically(
         drop(file);
         temporary.as_file().sync_all()?;
         temporary.persist(&target).map_err(|failed| failed.error)?;
-        // The rename lives in the folder. Some file systems cannot sync a folder; the file itself is safe by now.
+        // The folder holds the new name, so it is synced too. Some file systems cannot sync a folder; the error is
+        // ignored, because the file's content is on the disk already.
         let _ = File::open(folder).and_then(|folder| folder.sync_all());
         Ok(())
     })();
     written.map_err(|cause| output_error(path, folder, cause))
 }
 
-/// Creates `path` and the folders above it where they are missing.
+/// Creates the folder `path` and its missing parents.
 ///
 /// # Errors
 /// A file in the way, no permission, a full disk.

@@ -1,4 +1,4 @@
-//! What rays that leave the scene see.
+//! The environment: the light that arrives along rays that leave the scene.
 
 use std::f32::consts::PI;
 
@@ -13,36 +13,37 @@ pub enum Environment {
     Map(EnvironmentMap),
 }
 
-/// An equirectangular map; its centre looks along −Z, its top row is +Y, +X lies to the right of the centre.
+/// An equirectangular map. Its centre is the direction −Z, its top row is +Y, and +X lies to the right of the centre.
 #[derive(Debug, Clone)]
 pub struct EnvironmentMap {
     pub width: usize,
     pub height: usize,
-    /// Linear RGB, rows from the top, finite and not negative.
+    /// Linear RGB radiance, rows from the top, finite and not negative.
     pub texels: Vec<Vec3>,
 }
 
 impl EnvironmentMap {
-    /// Map coordinates ∈ [0,1)² of a unit direction; inverse of [`Self::direction`].
+    /// Map coordinates ∈ [0,1)² of a unit direction. Inverse of [`Self::direction`].
     pub fn uv(direction: Vec3) -> Vec2 {
         let u = 0.5 + direction.x.atan2(-direction.z) / (2.0 * PI);
         let v = direction.y.clamp(-1.0, 1.0).acos() / PI;
         Vec2::new(u, v)
     }
 
-    /// Unit direction of map coordinates; inverse of [`Self::uv`].
+    /// Unit direction of map coordinates. Inverse of [`Self::uv`].
     pub fn direction(uv: Vec2) -> Vec3 {
         let (sin_phi, cos_phi) = ((uv.x - 0.5) * 2.0 * PI).sin_cos();
         let (sin_theta, cos_theta) = (uv.y * PI).sin_cos();
         Vec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi)
     }
 
-    /// Radiance along a unit direction: the texel that holds it. Nearest, so that sampling by texel is exact.
+    /// Radiance along a unit direction: that of the texel which contains it. There is no interpolation, so the densities
+    /// for sampling by texel are exact.
     pub fn radiance(&self, direction: Vec3) -> Vec3 {
         self.texels[self.texel_index(direction)]
     }
 
-    /// Index in [`Self::texels`] of the texel that holds a unit direction.
+    /// Index in [`Self::texels`] of the texel that contains a unit direction.
     pub fn texel_index(&self, direction: Vec3) -> usize {
         let uv = Self::uv(direction);
         let x = ((uv.x * self.width as f32) as usize).min(self.width - 1);

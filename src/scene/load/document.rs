@@ -1,8 +1,8 @@
-//! The glTF JSON, taken apart element by element so that a message can name the element that is wrong.
+//! The glTF JSON, parsed element by element, so that an error message can name the faulty element.
 //!
-//! The types are the `gltf` crate's. Its own validation and readers are not used: validation panics on a POSITION
-//! accessor that does not exist and refuses files that only lack `min`/`max`; the readers trust the counts they find.
-//! Instead every index is looked up with a check where it is followed, so what nothing refers to cannot fail a load.
+//! The types come from the `gltf` crate. Its validation is not used: it panics on a POSITION accessor that does not exist,
+//! and it refuses files that only lack `min`/`max`. Its readers are not used either, because they trust the counts in the
+//! file. Instead every index is checked when it is followed. Faults in elements that nothing refers to are ignored.
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,8 @@ use super::extensions;
 use super::text::sentence;
 use crate::scene::error::{RE_EXPORT, SceneError};
 
-/// No real scene comes near; a JSON list of `{}` grows a hundredfold when parsed into typed elements.
+/// Most elements of a JSON list. Real scenes stay far below. The limit is needed because a list of `{}` takes a hundred
+/// times its size when it is parsed into typed elements.
 const MAX_ELEMENTS: usize = 1 << 20;
 
 pub(super) struct Document {
@@ -41,7 +42,7 @@ pub(super) struct Document {
 }
 
 impl Document {
-    /// Parses the JSON and refuses versions and required extensions that the loader does not know.
+    /// Parses the JSON. Refuses versions and required extensions that the loader does not read.
     pub fn parse(file: &Path, json: &[u8], warnings: &mut Vec<String>) -> Result<Document, SceneError> {
         let format = |what: String, remedy| SceneError::Format { file: file.to_owned(), what, remedy };
         let root: Value = serde_json::from_slice(json)
@@ -84,12 +85,12 @@ impl Document {
         })
     }
 
-    /// An error about what is wrong at `place`.
+    /// The error for the fault `what` at `place`.
     pub fn invalid(&self, place: impl Into<String>, what: impl Into<String>, remedy: &'static str) -> SceneError {
         SceneError::Invalid { file: self.file.clone(), place: place.into(), what: what.into(), remedy }
     }
 
-    /// The element that `place` refers to, or an error that it does not exist.
+    /// The element `index` of `list`, to which `place` refers. The error says that it does not exist.
     pub fn get<'a, T>(
         &self,
         list: &'a [T],
@@ -106,12 +107,12 @@ impl Document {
 
 #[derive(serde::Deserialize)]
 struct SceneRoots {
-    /// Absent in files of some exporters, although `gltf::json` requires it.
+    /// Some exporters omit this list. The type in `gltf::json` requires it, so it is not used.
     #[serde(default)]
     nodes: Vec<u32>,
 }
 
-/// The root object while its lists are taken out of it.
+/// The root object, from which the lists are taken one after the other.
 struct Sections<'a> {
     file: &'a Path,
     root: &'a mut Map<String, Value>,

@@ -1,4 +1,4 @@
-//! Materials in use, with their textures; alpha modes that change nothing become opaque.
+//! The materials in use, with their textures. Alpha modes without effect become opaque.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,10 +18,10 @@ use super::textures::Textures;
 use crate::scene::error::{RE_EXPORT, SceneError};
 use crate::scene::{AlphaMode, Material, MaterialIndex, TextureRef};
 
-/// The materials of everything drawn.
+/// The materials of all draws.
 pub(super) struct Materials {
     pub materials: Vec<Material>,
-    /// By glTF index; `None` is the default material.
+    /// From the glTF index, where `None` is the default material.
     indices: BTreeMap<Option<usize>, MaterialIndex>,
 }
 
@@ -76,7 +76,7 @@ impl Materials {
     }
 }
 
-/// Names of materials by what was done to them.
+/// For each change that the loader made to materials, the names of those materials.
 #[derive(Default)]
 struct Notes(BTreeMap<&'static str, BTreeSet<String>>);
 
@@ -139,14 +139,14 @@ fn read(
         notes.add("factors outside their range are clamped to it", place);
     }
     let emission = emission.max(Vec3::ZERO);
-    // A texture on a factor of zero is never looked up, so it need not exist.
+    // A texture whose factor is zero is never looked up, so it need not exist.
     let emission_slot = definition.emissive_texture.as_ref().filter(|_| emission != Vec3::ZERO).map(Slot::from);
     let normal_slot = normal.map(|n| Slot::from_normal(document, n, place)).transpose()?;
     let alpha_mode = match definition.alpha_mode {
         Checked::Valid(DefinedAlpha::Opaque) => AlphaMode::Opaque,
         Checked::Valid(DefinedAlpha::Mask) => AlphaMode::Mask { cutoff },
         Checked::Valid(DefinedAlpha::Blend) => AlphaMode::Blend,
-        Checked::Invalid => return Err(document.invalid(place, "its alphaMode is none of glTF's", RE_EXPORT)),
+        Checked::Invalid => return Err(document.invalid(place, "glTF does not define its alphaMode", RE_EXPORT)),
     };
     Ok(Material {
         name: definition.name.as_deref().map_or_else(|| place.to_owned(), short),
@@ -165,13 +165,16 @@ fn read(
     })
 }
 
-/// Extensions that change how light goes through a material, which is not modelled.
+/// Extensions that let light pass through a material, which is not modelled; each with its warning.
 const UNMODELLED: &[(&str, &str)] = &[
-    ("KHR_materials_transmission", "KHR_materials_transmission is not modelled; no light passes these"),
-    ("KHR_materials_diffuse_transmission", "KHR_materials_diffuse_transmission is not modelled; no light passes these"),
+    ("KHR_materials_transmission", "KHR_materials_transmission is not modelled; no light passes these materials"),
+    (
+        "KHR_materials_diffuse_transmission",
+        "KHR_materials_diffuse_transmission is not modelled; no light passes these materials",
+    ),
 ];
 
-/// `N` numbers under `key`: a list, or for N = 1 a number.
+/// The `N` numbers under `key`. They are a list, or for N = 1 a single number.
 fn numbers<const N: usize>(object: &Value, key: &str) -> Option<[f32; N]> {
     let value = object.get(key)?;
     let mut out = [0.0; N];
@@ -187,7 +190,8 @@ fn numbers<const N: usize>(object: &Value, key: &str) -> Option<[f32; N]> {
     Some(out)
 }
 
-/// Opaque where no texel and no vertex can make a difference. Interpolation never goes below the least value.
+/// The material's alpha mode, or opaque if no point of it can be transparent. The product of the least values of factor,
+/// vertices and texture is a lower bound, because interpolation never goes below the least value.
 fn simplest_alpha(material: &Material, least_vertex_alpha: f32, textures: &Textures) -> AlphaMode {
     let texture = material.base_color_texture.map_or(1.0, |t| textures.least_alpha[t.texture.0 as usize]);
     let least = material.base_color.w * least_vertex_alpha * texture;

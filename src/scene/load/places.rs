@@ -1,4 +1,4 @@
-//! Where meshes stand: skins in their bind pose and GPU instances.
+//! The places of meshes: skins in the pose of their joints, and GPU instances.
 
 use glam::{DMat3, DVec3};
 use gltf::json::{Accessor as AccessorDefinition, Index};
@@ -19,7 +19,8 @@ pub(super) enum Place {
     Skinned(usize),
 }
 
-/// Joint matrices at rest. The mesh node's own transform is not among them: glTF has joints place a skinned mesh.
+/// The joint matrices of a skin. They do not contain the transform of the mesh's own node, because in glTF the joints alone
+/// place a skinned mesh.
 pub(super) fn skeleton(
     document: &Document,
     buffers: &Buffers,
@@ -60,7 +61,7 @@ pub(super) fn skeleton(
     Ok(joints)
 }
 
-/// `EXT_mesh_gpu_instancing`: the node's transform × each instance's.
+/// The places of GPU instances (`EXT_mesh_gpu_instancing`): the node's transform × that of each instance.
 pub(super) fn instances(
     document: &Document,
     buffers: &Buffers,

@@ -1,4 +1,4 @@
-//! Where the vertices of a drawn primitive stand, relative to a point near the scene.
+//! Transforms of the vertices of a draw, relative to a point near the scene.
 
 use glam::{DMat3, DVec3};
 
@@ -7,7 +7,7 @@ use super::places::Place;
 use super::primitive::Primitive;
 use super::transform::{Pose, WorldPoint};
 
-/// The transform of one vertex: weighted joints, or the same pose for all.
+/// The transforms of a draw's vertices: one pose for all, or joints that each vertex weights.
 pub(super) enum Poses {
     Rigid(Pose),
     Skinned(Vec<Pose>),
@@ -38,7 +38,8 @@ impl Poses {
                 total += weight;
             }
         }
-        // Weights ought to sum to 1 and miss it by rounding; a vertex without any follows the first joint.
+        // The sum of weights should be 1 and is divided out, because files round it. A vertex without weights follows the
+        // first joint.
         if total == 0.0 {
             return joints[0];
         }

@@ -1,6 +1,6 @@
 //! Names and messages from a file, made safe to print on one line.
 
-/// `kind index 'name'`, safe to print on one line.
+/// The text `kind index 'name'`, for example `mesh 3 'Wall'`. It is safe to print on one line.
 pub(super) fn label(kind: &str, index: usize, name: Option<&str>) -> String {
     match name {
         None | Some("") => format!("{kind} {index}"),
@@ -8,7 +8,7 @@ pub(super) fn label(kind: &str, index: usize, name: Option<&str>) -> String {
     }
 }
 
-/// A name as it may stand in a one-line message.
+/// A name for a one-line message: without control characters, and cut if it is long.
 pub(super) fn short(name: &str) -> String {
     const MAX_CHARS: usize = 60;
     let cut: String = name.chars().take(MAX_CHARS).collect();
@@ -16,7 +16,7 @@ pub(super) fn short(name: &str) -> String {
     format!("{}{dots}", cut.escape_debug())
 }
 
-/// A message from a parser or decoder, on one line; a long one ends after a whole word.
+/// A message from a parser or decoder as one line. A long message is cut after a whole word.
 pub(super) fn sentence(message: &str) -> String {
     const MAX_CHARS: usize = 240;
     let line = message.split_whitespace().collect::<Vec<_>>().join(" ");

@@ -25,11 +25,12 @@ const FORMAT: &str = "OpenEXR";
 /// headroom. The Huffman runs of PIZ (512 bytes in 10 bits) and the other compressions stay below.
 const MAX_EXPANSION: u64 = 2 * 1032;
 
-/// Largest expansion of DWA. Before it deflates, DWA stores a flat block of 8 × 8 samples as one number: a factor of 64.
+/// Largest expansion of DWA. Before it deflates, DWA stores a flat block of 8 × 8 samples as one number: a factor of
+/// 64.
 const MAX_EXPANSION_DWA: u64 = 64 * MAX_EXPANSION;
 
-/// Decoded pictures up to this size are accepted from a file of any size: 4096 × 2048 black pixels take about a thousand
-/// bytes in DWA.
+/// Decoded pictures up to this size are accepted from a file of any size: 4096 × 2048 black pixels take about a
+/// thousand bytes in DWA.
 const HARMLESS_BYTES: u64 = 64 << 20;
 
 /// Least bytes of a block: its entry in the table of offsets (8), its coordinate (4) and its length (4).

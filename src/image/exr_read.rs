@@ -44,9 +44,9 @@ impl Picture {
 }
 
 impl LayeredImage {
-    /// Reads the first part that has colour: every layer with the three channels `layer.R`, `layer.G`, `layer.B`, sorted by
-    /// name, and the words and texts that [`LayeredImage::write_exr`] wrote. If the part has only plain R, G, B, they
-    /// become the layer `beauty`.
+    /// Reads the first part that has colour: every layer with the three channels `layer.R`, `layer.G`, `layer.B`,
+    /// sorted by name, and the words and texts that [`LayeredImage::write_exr`] wrote. If the part has only plain R, G,
+    /// B, they become the layer `beauty`.
     ///
     /// # Errors
     /// The file cannot be opened, is damaged, is deep or subsampled, or has no colour.
@@ -54,8 +54,8 @@ impl LayeredImage {
         LayeredImage::read_exr_layers(path, |_| true)
     }
 
-    /// Like [`LayeredImage::read_exr`], but reads only the layers whose names `is_wanted` accepts. A picture of many layers
-    /// is large.
+    /// Like [`LayeredImage::read_exr`], but reads only the layers whose names `is_wanted` accepts. A picture of many
+    /// layers is large.
     ///
     /// # Errors
     /// As those of [`LayeredImage::read_exr`].

@@ -33,8 +33,8 @@ const REC_709: Chromaticities = Chromaticities {
 };
 
 impl LayeredImage {
-    /// Writes all layers, sorted by channel name as EXR demands. The layer `beauty` is also written as plain R, G, B, which
-    /// other programs show; without a layer of that name the first layer is.
+    /// Writes all layers, sorted by channel name as EXR demands. The layer `beauty` is also written as plain R, G, B,
+    /// which other programs show; without a layer of that name the first layer is.
     ///
     /// # Errors
     /// Those of [`write_atomically`], no pixels, no layers, and names that are not plain identifiers.

@@ -47,7 +47,8 @@ impl LayeredImage {
         }
     }
 
-    /// Adds a layer of single values, such as depth in metres. R, G and B are equal. Undone by [`LayeredImage::scalar`].
+    /// Adds a layer of single values, such as depth in metres. R, G and B are equal. Undone by
+    /// [`LayeredImage::scalar`].
     ///
     /// # Panics
     /// If the number of `values` is not `width · height`.

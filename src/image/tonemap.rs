@@ -14,12 +14,12 @@ const BLACK_BELOW_MEDIAN: f32 = 1.0e-4;
 /// Bound of an automatic exposure, ± EV. Luminances of 10⁹ and 10⁻⁹ need ±33.
 const EXPOSURE_LIMIT_EV: f32 = 40.0;
 
-/// Arguments of the tone curve are clamped to this. The curve reaches 1 at 7.25, and the squares of very large arguments
-/// would overflow and give NaN.
+/// Arguments of the tone curve are clamped to this. The curve reaches 1 at 7.25, and the squares of very large
+/// arguments would overflow and give NaN.
 const CURVE_SATURATED: f32 = 16.0;
 
-/// The sRGB code in [0,1]³ of a linear `pixel` at `exposure_ev`. Each channel is multiplied by 2^EV, then passes through
-/// the tone curve and the sRGB transfer function. Negative channels and NaN give 0, infinity gives 1.
+/// The sRGB code in [0,1]³ of a linear `pixel` at `exposure_ev`. Each channel is multiplied by 2^EV, then passes
+/// through the tone curve and the sRGB transfer function. Negative channels and NaN give 0, infinity gives 1.
 pub fn tonemap(pixel: Vec3, exposure_ev: f32) -> Vec3 {
     let gain = exposure_ev.exp2();
     Vec3::from_array(pixel.to_array().map(|channel| srgb_from_linear(tone_curve(channel * gain))))
@@ -33,11 +33,11 @@ fn tone_curve(x: f32) -> f32 {
     (x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)).min(1.0)
 }
 
-/// The exposure, EV, that brings the log-average of these luminances to 18 % grey (E. Reinhard et al., "Photographic Tone
-/// Reproduction for Digital Images", 2002, equations 1 and 2). It is clamped to ±40 EV.
+/// The exposure, EV, that brings the log-average of these luminances to 18 % grey (E. Reinhard et al., "Photographic
+/// Tone Reproduction for Digital Images", 2002, equations 1 and 2). It is clamped to ±40 EV.
 ///
-/// Black, negative and non-finite luminances do not count. Luminances more than 13 stops below the median of the others do
-/// not count either; otherwise a black background or an unlit room would set the exposure. A black picture gives 0.
+/// Black, negative and non-finite luminances do not count. Luminances more than 13 stops below the median of the others
+/// do not count either; otherwise a black background or an unlit room would set the exposure. A black picture gives 0.
 pub fn auto_exposure(luminances: impl IntoIterator<Item = f32>) -> f32 {
     let mut lit: Vec<f32> = luminances.into_iter().filter(|l| l.is_finite() && *l > 0.0).collect();
     if lit.is_empty() {
@@ -75,7 +75,8 @@ mod tests {
 
     #[test]
     fn tone_map_has_its_known_value() {
-        // 0.18: (0.18·(2.51·0.18+0.03)) / (0.18·(2.43·0.18+0.59)+0.14) = 0.086724/0.324932 = 0.26690, whose sRGB code is 0.5534.
+        // 0.18: (0.18·(2.51·0.18+0.03)) / (0.18·(2.43·0.18+0.59)+0.14) = 0.086724/0.324932 = 0.26690, whose sRGB code
+        // is 0.5534.
         assert!((tonemap(Vec3::splat(0.18), 0.0).x - 0.5534).abs() < 2e-4);
     }
 

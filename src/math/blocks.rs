@@ -1,8 +1,9 @@
 //! Points that cover their domain evenly, in blocks of sixteen.
 //!
 //! Inside a block every pair of dimensions has its own Owen-scrambled (0,2)-sequence in its own order ("padding":
-//! Kollig & Keller 2002, Burley, *Practical Hash-based Owen Scrambling*, JCGT 9(4), 2020). In each pair, every elementary
-//! interval of area 1/16 (1 × 16, 2 × 8, 4 × 4, …) holds one point. The first 2, 4 and 8 points are stratified likewise.
+//! Kollig & Keller 2002, Burley, *Practical Hash-based Owen Scrambling*, JCGT 9(4), 2020). In each pair, every
+//! elementary interval of area 1/16 (1 × 16, 2 × 8, 4 × 4, …) holds one point. The first 2, 4 and 8 points are
+//! stratified likewise.
 //!
 //! Blocks are independent of each other. This has two uses:
 //! * The spread between the means of blocks measures the error of their mean. The spread between single points would
@@ -38,7 +39,8 @@ pub struct Block {
 }
 
 impl Block {
-    /// The four arguments name the block as they name a stream of [`Random`]. Blocks of different names are independent.
+    /// The four arguments name the block as they name a stream of [`Random`]. Blocks of different names are
+    /// independent.
     pub fn new(seed: u64, purpose: Purpose, a: u64, b: u64) -> Block {
         let mut random = Random::new(seed, purpose, a, b);
         let high = u64::from(random.bits());
@@ -114,8 +116,8 @@ impl Numbers for BlockSample {
     }
 }
 
-/// Owen's scrambling of four bits. Bit k from the top is flipped by the random bit that belongs to the values of the bits
-/// above it.
+/// Owen's scrambling of four bits. Bit k from the top is flipped by the random bit that belongs to the values of the
+/// bits above it.
 #[inline]
 fn scrambled(value: u32, random: u32) -> u32 {
     let flip = |k: u32| {

@@ -1,7 +1,7 @@
 //! The octahedral map between unit directions and the square `oct` ∈ [−1,1]², its inverse and its density.
 //!
-//! Source: Cigolle et al., *A Survey of Efficient Representations for Independent Unit Vectors*, JCGT 3(2), 2014.
-//! The pole is +Z. Texture coordinates give `oct = 2·uv − 1`. The maps of probes are square: the row follows v, the column
+//! Source: Cigolle et al., *A Survey of Efficient Representations for Independent Unit Vectors*, JCGT 3(2), 2014. The
+//! pole is +Z. Texture coordinates give `oct = 2·uv − 1`. The maps of probes are square: the row follows v, the column
 //! follows u, and texel centres lie at `uv = (i + ½)/R` for the resolution R.
 
 use glam::{Vec2, Vec3};
@@ -65,9 +65,9 @@ pub fn texel_direction(column: usize, row: usize, resolution: usize) -> Vec3 {
     direction_from_oct(Vec2::new(texel_centre(column, resolution), texel_centre(row, resolution)))
 }
 
-/// The texel inside the map that continues it at (`column`, `row`), at most one step outside: both indices run from −1 to
-/// `resolution`. A step across an edge arrives mirrored about the middle of that edge; a step across a corner arrives at
-/// the diagonally opposite corner.
+/// The texel inside the map that continues it at (`column`, `row`), at most one step outside: both indices run from −1
+/// to `resolution`. A step across an edge arrives mirrored about the middle of that edge; a step across a corner
+/// arrives at the diagonally opposite corner.
 pub fn wrap_texel(column: isize, row: isize, resolution: usize) -> (usize, usize) {
     let last = resolution as isize - 1;
     let (mut c, mut r) = (column, row);
@@ -76,8 +76,8 @@ pub fn wrap_texel(column: isize, row: isize, resolution: usize) -> (usize, usize
         r = r.clamp(0, last);
     }
     if c < 0 || c > last {
-        // This covers the side edges. It also covers corners, whose column the step above has mirrored to the other side
-        // but left outside.
+        // This covers the side edges. It also covers corners, whose column the step above has mirrored to the other
+        // side but left outside.
         r = last - r;
         c = c.clamp(0, last);
     }

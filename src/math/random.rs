@@ -37,8 +37,8 @@ pub trait Numbers {
     fn pair(&mut self) -> Vec2;
 }
 
-/// One stream, named by a seed, a purpose and two indices (probe and texel, pixel and sample, …). Equal names give equal
-/// numbers.
+/// One stream, named by a seed, a purpose and two indices (probe and texel, pixel and sample, …). Equal names give
+/// equal numbers.
 #[derive(Debug, Clone)]
 pub struct Random(Pcg32);
 
@@ -68,9 +68,10 @@ pub fn unit_from_bits(bits: u32) -> f32 {
 
 /// An endless sequence of points that fill the unit cube of four dimensions evenly, from a random start.
 ///
-/// It is a Kronecker sequence: each point is the previous one plus a constant step, modulo 1. The steps are the powers of
-/// 1/φ₄, where φ₄ is the positive root of x⁵ = x + 1 (Roberts, *The Unreasonable Effectiveness of Quasirandom Sequences*,
-/// 2018). Coordinates are integers in units of 2⁻³², so their overflow is the modulo. Each single point is uniform.
+/// It is a Kronecker sequence: each point is the previous one plus a constant step, modulo 1. The steps are the powers
+/// of 1/φ₄, where φ₄ is the positive root of x⁵ = x + 1 (Roberts, *The Unreasonable Effectiveness of Quasirandom
+/// Sequences*, 2018). Coordinates are integers in units of 2⁻³², so their overflow is the modulo. Each single point is
+/// uniform.
 #[derive(Debug, Clone)]
 pub struct KroneckerSequence([u32; 4]);
 
@@ -122,8 +123,8 @@ pub(super) fn mix(x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// A number in [0,1) that depends on three words alone. It serves decisions whose result must not depend on the order in
-/// which they are made.
+/// A number in [0,1) that depends on three words alone. It serves decisions whose result must not depend on the order
+/// in which they are made.
 pub fn hash_to_unit(a: u32, b: u32, c: u32) -> f32 {
     let bits = mix(mix((u64::from(a) << 32) | u64::from(b)) ^ u64::from(c));
     (bits >> 40) as f32 * (1.0 / (1u32 << 24) as f32)

@@ -33,8 +33,8 @@ pub fn concentric_disc(u: Vec2) -> Vec2 {
     }
 }
 
-/// Sine and cosine of |x| ≤ π/4 by their Taylor series. The first omitted terms are at most 3·10⁻⁷ and 3·10⁻⁸. This takes
-/// a third of the time of the library's functions, which must handle all angles.
+/// Sine and cosine of |x| ≤ π/4 by their Taylor series. The first omitted terms are at most 3·10⁻⁷ and 3·10⁻⁸. This
+/// takes a third of the time of the library's functions, which must handle all angles.
 #[inline]
 fn sin_cos_octant(x: f32) -> (f32, f32) {
     let s = x * x;

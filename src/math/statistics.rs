@@ -2,8 +2,8 @@
 
 /// Weighted mean and central second moment (Welford's update in West's weighted form, 1979).
 ///
-/// Raw sums would give the variance as `E[x²] − E[x]²`. That difference loses all digits when the spread is small against
-/// the mean. The update used here keeps them.
+/// Raw sums would give the variance as `E[x²] − E[x]²`. That difference loses all digits when the spread is small
+/// against the mean. The update used here keeps them.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Moments {
     weight: f64,
@@ -44,7 +44,8 @@ impl Moments {
         self.mean
     }
 
-    /// Variance of the weighted set itself, not an estimate for a larger population. Never negative; 0 for an empty set.
+    /// Variance of the weighted set itself, not an estimate for a larger population. Never negative; 0 for an empty
+    /// set.
     pub fn variance(&self) -> f64 {
         if self.weight > 0.0 { self.scatter / self.weight } else { 0.0 }
     }

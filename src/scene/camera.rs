@@ -38,13 +38,15 @@ impl Camera {
         }
     }
 
-    /// The ray through the centre of pixel (`x`, `y`), counted from the top-left corner of a `width` × `height` picture.
+    /// The ray through the centre of pixel (`x`, `y`), counted from the top-left corner of a `width` × `height`
+    /// picture.
     pub fn pixel_ray(&self, x: u32, y: u32, width: u32, height: u32) -> (Vec3, Vec3) {
         let uv = Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
         self.ray(Vec2::new(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y), width as f32 / height as f32)
     }
 
-    /// A perspective camera at `position` that looks at `target`. Its up direction is +Y, or +Z if the view is vertical.
+    /// A perspective camera at `position` that looks at `target`. Its up direction is +Y, or +Z if the view is
+    /// vertical.
     pub fn look_at(name: &str, position: Vec3, target: Vec3, fov_y_rad: f32) -> Camera {
         let back = (position - target).normalize_or(Vec3::Z);
         // Within half a degree of vertical, +Y is too close to the view to give a right vector.

@@ -37,8 +37,8 @@ impl EnvironmentMap {
         Vec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi)
     }
 
-    /// Radiance along a unit direction: that of the texel which contains it. There is no interpolation, so the densities
-    /// for sampling by texel are exact.
+    /// Radiance along a unit direction: that of the texel which contains it. There is no interpolation, so the
+    /// densities for sampling by texel are exact.
     pub fn radiance(&self, direction: Vec3) -> Vec3 {
         self.texels[self.texel_index(direction)]
     }

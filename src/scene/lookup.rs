@@ -82,8 +82,8 @@ impl Scene {
         }
     }
 
-    /// Tangent and bitangent at the point. They come from the file's tangents, or from the axes of the texture coordinates
-    /// if the file has no usable tangent.
+    /// Tangent and bitangent at the point. They come from the file's tangents, or from the axes of the texture
+    /// coordinates if the file has no usable tangent.
     fn tangent_frame(
         &self,
         triangle: TriangleIndex,

@@ -17,14 +17,15 @@ pub struct TriangleIndex(pub u32);
 pub struct Mesh {
     /// Metres, one per vertex.
     pub positions: Vec<Vec3>,
-    /// Unit shading normals, one per vertex. A normal that is missing or degenerate in the file is zero here; the geometric
-    /// normal then takes its place.
+    /// Unit shading normals, one per vertex. A normal that is missing or degenerate in the file is zero here; the
+    /// geometric normal then takes its place.
     pub normals: Vec<Vec3>,
     /// TEXCOORD_0 and TEXCOORD_1, one per vertex, or zero if the file has none.
     pub uvs: [Vec<Vec2>; 2],
     /// Linear RGBA vertex colours, one per vertex. Empty if no mesh of the scene has colours.
     pub colors: Vec<Vec4>,
-    /// Unit tangents (xyz) and handedness (w), one per vertex. Empty if no mesh has tangents; zero for vertices without.
+    /// Unit tangents (xyz) and handedness (w), one per vertex. Empty if no mesh has tangents; zero for vertices
+    /// without.
     pub tangents: Vec<Vec4>,
     /// Vertex indices, opaque triangles first.
     pub triangles: Vec<[u32; 3]>,

@@ -32,8 +32,8 @@ impl Texture {
         }
     }
 
-    /// Linear RGBA at `uv`, interpolated bilinearly, or the nearest texel if the sampler asks for that. There are no mip
-    /// levels, because averaging many rays filters the texture.
+    /// Linear RGBA at `uv`, interpolated bilinearly, or the nearest texel if the sampler asks for that. There are no
+    /// mip levels, because averaging many rays filters the texture.
     pub fn sample(&self, uv: Vec2) -> Vec4 {
         if self.width == 1 && self.height == 1 {
             return self.texel(0, 0);
@@ -74,8 +74,8 @@ impl Texture {
     }
 }
 
-/// Largest integer not above `x`. It is faster than `f32::floor`, which is a function call on processors without SSE 4.1,
-/// the baseline that the crate is compiled for. The cast saturates and turns NaN into 0, so every result is valid.
+/// Largest integer not above `x`. It is faster than `f32::floor`, which is a function call on processors without SSE
+/// 4.1, the baseline that the crate is compiled for. The cast saturates and turns NaN into 0, so every result is valid.
 #[inline]
 fn floor(x: f32) -> i64 {
     let truncated = x as i64;

@@ -1,4 +1,4 @@
-//! Cameras to pictures: what is seen, how probes light it, and the layers that come of it.
+//! From cameras to pictures: which points a camera sees, how probes or paths light them, and the layers of the result.
 
 mod develop;
 pub mod film;

@@ -1,4 +1,5 @@
-//! The probes' light at a picture's points: without visibility, with the mode's own, and with exact rays.
+//! The probes' light at a picture's points in three visibility modes: without a visibility test, with the test of the
+//! probe file, and with exact rays.
 
 use std::time::Instant;
 
@@ -10,24 +11,28 @@ use crate::light::World;
 use crate::probe::query::{Query, Visibility};
 use crate::trace::Ray;
 
-/// How often the shading is repeated for its time.
+/// Number of times that shading is repeated to measure its time.
 pub const RUNS: usize = 5;
 
-/// Points over which the time of a single look-up is averaged.
+/// Most points over which the time of a look-up is averaged.
 const LOOKUP_POINTS: usize = 20_000;
 
-/// The three ways of treating visibility, in the order of the report.
+/// Which visibility test the look-up uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum VisibilityMode {
+    /// None.
     Off,
+    /// The test that the probe file stores.
     On,
+    /// Exact rays from the point to the probes.
     Ray,
 }
 
 impl VisibilityMode {
+    /// All modes in the order of the report.
     pub const ALL: [VisibilityMode; 3] = [VisibilityMode::Off, VisibilityMode::On, VisibilityMode::Ray];
 
-    /// Name in the report and of the pictures.
+    /// Name in reports and in the file names of pictures.
     pub fn name(self) -> &'static str {
         match self {
             VisibilityMode::Off => "visibility_off",
@@ -36,7 +41,7 @@ impl VisibilityMode {
         }
     }
 
-    /// Where a point's visibility factor comes from; `mask` is the exact one.
+    /// The source of a point's visibility factors. `mask` is the point's entry of [`exact_masks`].
     pub fn visibility(self, mask: u8) -> Visibility {
         match self {
             VisibilityMode::Off => Visibility::Off,
@@ -46,11 +51,12 @@ impl VisibilityMode {
     }
 }
 
-/// Which of its eight probes a point sees, exactly: bit i for corner i, inactive probes never.
+/// For every point, which of its eight probes it sees: bit i is set if the probe of corner i is active and visible.
 ///
-/// Visible = the segment from P + ε·n_g to the probe is unblocked, n_g the geometric normal on the viewer's side. From the
-/// surface, as in the survey: ε is the rounding there, and that of a ray which starts farther from the scene's origin may
-/// be larger.
+/// A probe is visible if no surface blocks the segment from P + ε·n_g to the probe, where n_g is the geometric normal
+/// on the viewer's side and ε the ray offset of the surface. The segment starts at the surface, as in the survey,
+/// because ε accounts for the rounding there. A ray from a probe farther from the scene's origin would need a larger
+/// offset.
 pub fn exact_masks(world: &World, query: &Query, points: &[ImagePoint]) -> Vec<u8> {
     let volume = query.volume;
     points
@@ -71,12 +77,12 @@ pub fn exact_masks(world: &World, query: &Query, points: &[ImagePoint]) -> Vec<u
         .collect()
 }
 
-/// Irradiance at every point, W·m⁻².
+/// Irradiance from the probes at every point, W·m⁻².
 pub fn irradiance(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<Vec3> {
     points.par_iter().zip(masks).map(|(point, &mask)| query.irradiance(&point.query(), mode.visibility(mask))).collect()
 }
 
-/// Milliseconds that querying and shading all points took, one entry a run.
+/// Milliseconds for querying and shading all points, one entry per run.
 pub fn time_shading(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<f64> {
     let mut radiance = vec![Vec3::ZERO; points.len()];
     (0..RUNS)
@@ -92,7 +98,7 @@ pub fn time_shading(query: &Query, points: &[ImagePoint], masks: &[u8], mode: Vi
         .collect()
 }
 
-/// Nanoseconds of one look-up on one thread; `None` without points.
+/// Nanoseconds of one look-up on one thread. `None` without points.
 pub fn time_lookup(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Option<f64> {
     let step = points.len().div_ceil(LOOKUP_POINTS).max(1);
     let chosen: Vec<_> = points.iter().zip(masks).step_by(step).map(|(p, &mask)| (p.query(), mask)).collect();

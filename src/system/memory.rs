@@ -1,4 +1,5 @@
-//! How much memory is available. A run that needs more is refused at its start; otherwise the system would kill it later.
+//! How much memory is available. A run that needs more is refused at its start; otherwise the system would kill it
+//! later.
 
 use std::fs;
 use std::path::Path;
@@ -20,8 +21,9 @@ pub struct TooLittleMemory {
     pub remedy: &'static str,
 }
 
-/// Bytes that this process can still allocate. Three limits count, and the smallest decides: free memory of the machine,
-/// the limits of the process's control groups, and its limit of address space. `None` if the system reports none of them.
+/// Bytes that this process can still allocate. Three limits count, and the smallest decides: free memory of the
+/// machine, the limits of the process's control groups, and its limit of address space. `None` if the system reports
+/// none of them.
 pub fn available_bytes() -> Option<u64> {
     [machine(), control_groups(), address_space()].into_iter().flatten().min()
 }

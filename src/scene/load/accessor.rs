@@ -105,8 +105,9 @@ impl<'a> Accessor<'a> {
         }
     }
 
-    /// All elements as floats. Missing components are taken from `fill`. `unsigned_is_normalized` is for attributes whose
-    /// unsigned integers always mean fractions (colours, weights), even if the accessor lacks the flag `normalized`.
+    /// All elements as floats. Missing components are taken from `fill`. `unsigned_is_normalized` is for attributes
+    /// whose unsigned integers always mean fractions (colours, weights), even if the accessor lacks the flag
+    /// `normalized`.
     pub fn floats<const N: usize>(&self, fill: [f32; N], unsigned_is_normalized: bool) -> Vec<[f32; N]> {
         use ComponentType::{U8, U16};
         let normalized = self.normalized || (unsigned_is_normalized && matches!(self.component_type, U8 | U16));
@@ -213,8 +214,8 @@ fn integer(raw: &[u8], component_type: ComponentType) -> u32 {
     }
 }
 
-/// The float value of a component. Normalised integers follow glTF 2.0, section 3.6.2.2: c/255, c/65535, max(c/127, −1),
-/// max(c/32767, −1).
+/// The float value of a component. Normalised integers follow glTF 2.0, section 3.6.2.2: c/255, c/65535, max(c/127,
+/// −1), max(c/32767, −1).
 fn float(raw: &[u8], component_type: ComponentType, normalized: bool) -> f32 {
     let bits = integer(raw, component_type);
     let (value, one) = match component_type {

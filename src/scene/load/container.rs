@@ -1,5 +1,5 @@
-//! GLB, the binary container of glTF: header, JSON chunk, optional BIN chunk. A file that does not start with GLB's magic
-//! bytes is JSON text.
+//! GLB, the binary container of glTF: header, JSON chunk, optional BIN chunk. A file that does not start with GLB's
+//! magic bytes is JSON text.
 
 use std::ops::Range;
 
@@ -33,7 +33,8 @@ pub(super) fn split(bytes: &[u8]) -> Result<Parts, String> {
     // The specification pads the JSON with spaces. Padding with NUL is common too.
     let trimmed = bytes[json.clone()].iter().rposition(|b| !matches!(b, 0 | b' ')).map_or(0, |last| last + 1);
     let json = json.start..json.start + trimmed;
-    // Chunks start at multiples of four. Some writers omit the padding, so the next chunk may start right behind the JSON.
+    // Chunks start at multiples of four. Some writers omit the padding, so the next chunk may start right behind the
+    // JSON.
     let padded = end.next_multiple_of(4);
     let bin = match chunk(bytes, padded, CHUNK_BIN)? {
         None if padded != end => chunk(bytes, end, CHUNK_BIN)?,

@@ -1,8 +1,9 @@
 //! The glTF JSON, parsed element by element, so that an error message can name the faulty element.
 //!
-//! The types come from the `gltf` crate. Its validation is not used: it panics on a POSITION accessor that does not exist,
-//! and it refuses files that only lack `min`/`max`. Its readers are not used either, because they trust the counts in the
-//! file. Instead every index is checked when it is followed. Faults in elements that nothing refers to are ignored.
+//! The types come from the `gltf` crate. Its validation is not used: it panics on a POSITION accessor that does not
+//! exist, and it refuses files that only lack `min`/`max`. Its readers are not used either, because they trust the
+//! counts in the file. Instead every index is checked when it is followed. Faults in elements that nothing refers to
+//! are ignored.
 
 use std::path::{Path, PathBuf};
 

@@ -31,9 +31,9 @@ pub(super) struct Draws {
     pub skipped: Skipped,
 }
 
-/// Most vertices of a scene, or as many as the input has bytes if that is more. The limit is needed because each instance
-/// gets its own copy of its mesh, so a small file can ask for a huge scene. Scenes without instances never reach it. At
-/// 72 bytes per vertex and 16 per triangle a small file takes less than 1 GiB.
+/// Most vertices of a scene, or as many as the input has bytes if that is more. The limit is needed because each
+/// instance gets its own copy of its mesh, so a small file can ask for a huge scene. Scenes without instances never
+/// reach it. At 72 bytes per vertex and 16 per triangle a small file takes less than 1 GiB.
 const MAX_VERTICES: u64 = 1 << 23;
 /// Most triangles of a scene, likewise.
 const MAX_TRIANGLES: u64 = 1 << 24;

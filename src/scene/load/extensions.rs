@@ -18,8 +18,8 @@ const READ: &[&str] = &[
     "KHR_texture_transform",
 ];
 
-/// Extensions that are ignored with a warning even if the file requires them. Without them the scene keeps its shape, and
-/// its diffuse light hardly changes.
+/// Extensions that are ignored with a warning even if the file requires them. Without them the scene keeps its shape,
+/// and its diffuse light hardly changes.
 const APPROXIMATED: &[&str] = &[
     "KHR_animation_pointer",
     "KHR_materials_anisotropy",
@@ -44,8 +44,8 @@ pub(super) const COMPRESSED_GEOMETRY: &[&str] =
 pub(super) const COMPRESSED_IMAGES: &[&str] =
     &["KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds"];
 
-/// The advice to a user whose file needs an extension that is not read. `gltf-transform copy` decodes compressed geometry
-/// and writes plain data.
+/// The advice to a user whose file needs an extension that is not read. `gltf-transform copy` decodes compressed
+/// geometry and writes plain data.
 pub(super) fn remedy(extension: &str) -> &'static str {
     match extension {
         "KHR_draco_mesh_compression" => "decode it with `gltf-transform copy IN.glb OUT.glb`",

@@ -1,8 +1,8 @@
 //! Copies all draws into one list of vertices, with positions relative to the middle of the scene.
 //!
-//! Positions are computed in f64 relative to a landmark, a point in the scene. Their bounding box gives the centre. Only
-//! the final `(A·p + (t − landmark)) − centre` is rounded to f32. So the result does not depend on the scene's position in
-//! the world.
+//! Positions are computed in f64 relative to a landmark, a point in the scene. Their bounding box gives the centre.
+//! Only the final `(A·p + (t − landmark)) − centre` is rounded to f32. So the result does not depend on the scene's
+//! position in the world.
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
@@ -169,8 +169,8 @@ impl Pool {
     }
 }
 
-/// The tangent in world space. Tangents lie in the surface, so they transform like edges. Mirroring reverses the handedness
-/// of their frame.
+/// The tangent in world space. Tangents lie in the surface, so they transform like edges. Mirroring reverses the
+/// handedness of their frame.
 fn moved_tangent(tangent: Vec4, pose: &Pose) -> Vec4 {
     let local = tangent.truncate().as_dvec3().normalize_or_zero();
     let direction = (pose.linear * local).normalize_or_zero().as_vec3();

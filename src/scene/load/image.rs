@@ -9,8 +9,8 @@ use crate::scene::material::Texels;
 
 /// Most pixels of an image's width and of its height.
 const MAX_SIDE: u32 = 16384;
-/// The decoded textures of a scene may take this many bytes, or [`MAX_RATIO`] × the bytes of their files if that is more.
-/// While an image is being converted, memory can reach twice this budget.
+/// The decoded textures of a scene may take this many bytes, or [`MAX_RATIO`] × the bytes of their files if that is
+/// more. While an image is being converted, memory can reach twice this budget.
 const MIN_BUDGET: u64 = 384 << 20;
 /// Most decoded bytes per byte of a file. A JPEG with half a bit per pixel grows 64-fold; a malicious PNG can grow a
 /// thousandfold.

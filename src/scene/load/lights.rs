@@ -108,8 +108,8 @@ fn kind(
     }
 }
 
-/// The cameras of the visible nodes, with unique names. A camera that cannot be used is left out with a warning and is no
-/// error, because a bake needs no camera.
+/// The cameras of the visible nodes, with unique names. A camera that cannot be used is left out with a warning and is
+/// no error, because a bake needs no camera.
 pub(super) fn cameras(
     document: &Document,
     nodes: &Nodes,
@@ -148,7 +148,8 @@ fn unique(name: String, taken: &mut HashSet<String>) -> String {
     candidate
 }
 
-/// The node's right, up and back vectors, made orthonormal. `None` if the transform has no view direction or no up vector.
+/// The node's right, up and back vectors, made orthonormal. `None` if the transform has no view direction or no up
+/// vector.
 fn frame(pose: &Pose) -> Option<Mat3> {
     let back = pose.linear.z_axis.try_normalize()?;
     let right = pose.linear.y_axis.try_normalize()?.cross(back).try_normalize()?;

@@ -190,8 +190,8 @@ fn numbers<const N: usize>(object: &Value, key: &str) -> Option<[f32; N]> {
     Some(out)
 }
 
-/// The material's alpha mode, or opaque if no point of it can be transparent. The product of the least values of factor,
-/// vertices and texture is a lower bound, because interpolation never goes below the least value.
+/// The material's alpha mode, or opaque if no point of it can be transparent. The product of the least values of
+/// factor, vertices and texture is a lower bound, because interpolation never goes below the least value.
 fn simplest_alpha(material: &Material, least_vertex_alpha: f32, textures: &Textures) -> AlphaMode {
     let texture = material.base_color_texture.map_or(1.0, |t| textures.least_alpha[t.texture.0 as usize]);
     let least = material.base_color.w * least_vertex_alpha * texture;

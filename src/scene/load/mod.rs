@@ -1,6 +1,7 @@
 //! From a glTF file to a [`Scene`]: container → JSON → buffers → nodes → meshes → materials → one list of triangles.
 //!
-//! Everything in a file is checked before it is used. The sizes that a header claims never decide how much is allocated.
+//! Everything in a file is checked before it is used. The sizes that a header claims never decide how much is
+//! allocated.
 
 mod accessor;
 mod buffers;

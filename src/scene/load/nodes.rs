@@ -56,8 +56,8 @@ fn check_parents(document: &Document) -> Result<Vec<bool>, SceneError> {
     Ok(is_child)
 }
 
-/// World transforms of all nodes. The walk starts at the nodes without parent (`top`). Each node has at most one parent, so
-/// the nodes that the walk does not reach lie on or below a cycle.
+/// World transforms of all nodes. The walk starts at the nodes without parent (`top`). Each node has at most one
+/// parent, so the nodes that the walk does not reach lie on or below a cycle.
 fn place(document: &Document, top: &[usize]) -> Result<Vec<Placement>, SceneError> {
     let mut placements = vec![None; document.nodes.len()];
     let mut stack: Vec<(usize, Placement)> = top.iter().map(|&node| (node, Placement::IDENTITY)).collect();

@@ -19,8 +19,8 @@ pub(super) enum Place {
     Skinned(usize),
 }
 
-/// The joint matrices of a skin. They do not contain the transform of the mesh's own node, because in glTF the joints alone
-/// place a skinned mesh.
+/// The joint matrices of a skin. They do not contain the transform of the mesh's own node, because in glTF the joints
+/// alone place a skinned mesh.
 pub(super) fn skeleton(
     document: &Document,
     buffers: &Buffers,

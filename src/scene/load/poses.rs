@@ -38,8 +38,8 @@ impl Poses {
                 total += weight;
             }
         }
-        // The sum of weights should be 1 and is divided out, because files round it. A vertex without weights follows the
-        // first joint.
+        // The sum of weights should be 1 and is divided out, because files round it. A vertex without weights follows
+        // the first joint.
         if total == 0.0 {
             return joints[0];
         }

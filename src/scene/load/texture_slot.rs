@@ -68,8 +68,8 @@ fn parse<T: DeserializeOwned>(document: &Document, value: &Value, key: &str, pla
 
 /// Translation · rotation · scale. The rotation is counter-clockwise as seen with v pointing down: u′ = u·cos + v·sin.
 ///
-/// The extension's text, its example and its viewers agree on this. The GLSL code in its text turns the other way, because
-/// GLSL lists matrices column by column.
+/// The extension's text, its example and its viewers agree on this. The GLSL code in its text turns the other way,
+/// because GLSL lists matrices column by column.
 fn matrix(transform: &TextureTransform) -> Mat3 {
     let (sin, cos) = transform.rotation.0.sin_cos();
     let scale = Vec2::from_array(transform.scale.0);

@@ -111,9 +111,9 @@ pub(super) fn world_point(point: &WorldPoint, offset: DVec3) -> DVec3 {
     DVec3::new(axis(0), axis(1), axis(2))
 }
 
-/// The matrix that transforms normals, up to a positive factor: the cofactor matrix times the sign of the determinant. It
-/// equals the inverse transpose up to that factor but needs no division, so it exists for all transforms. Outward normals
-/// stay outward under mirroring. A transform that flattens onto a plane gives the plane's normal.
+/// The matrix that transforms normals, up to a positive factor: the cofactor matrix times the sign of the determinant.
+/// It equals the inverse transpose up to that factor but needs no division, so it exists for all transforms. Outward
+/// normals stay outward under mirroring. A transform that flattens onto a plane gives the plane's normal.
 pub(super) fn normal_matrix(linear: &DMat3) -> DMat3 {
     let a = of_unit_size(linear);
     let cofactor = DMat3::from_cols(a.y_axis.cross(a.z_axis), a.z_axis.cross(a.x_axis), a.x_axis.cross(a.y_axis));

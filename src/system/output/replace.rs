@@ -34,8 +34,8 @@ pub fn replace(old: &Path, new: &Path) -> Result<(), OutputError> {
     write_atomically(old, |file| io::copy(&mut source, file).map(drop))
 }
 
-/// Repairs the state after a crash during [`replace`]: it completes an exchange that stopped between its two renames and
-/// removes leftover copies.
+/// Repairs the state after a crash during [`replace`]: it completes an exchange that stopped between its two renames
+/// and removes leftover copies.
 ///
 /// # Errors
 /// Those of the disk.

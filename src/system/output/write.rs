@@ -9,8 +9,8 @@ use super::check::check_folder;
 use super::error::{OutputError, output_error};
 use super::paths::{folder_of, link_target};
 
-/// Mode of a new file, from which the kernel removes the bits of the umask. The temporary-file crate would make the file
-/// private to its owner (0600).
+/// Mode of a new file, from which the kernel removes the bits of the umask. The temporary-file crate would make the
+/// file private to its owner (0600).
 const MODE_BEFORE_UMASK: u32 = 0o666;
 
 /// Start of the temporary file's name. The file lies beside the output until it is renamed.
@@ -19,9 +19,9 @@ pub(super) const TEMPORARY_PREFIX: &str = ".lightprobe-";
 /// What a writer writes into. It can seek, which the table of offsets in an EXR file needs.
 pub type OutputFile<'a> = BufWriter<&'a mut File>;
 
-/// Writes `path` through a temporary file in the same folder. The temporary file is synced to the disk and then renamed,
-/// so readers see the old file or the new one and never a part. An existing file is replaced. If `path` is a symbolic
-/// link, the file behind it is replaced and the link stays.
+/// Writes `path` through a temporary file in the same folder. The temporary file is synced to the disk and then
+/// renamed, so readers see the old file or the new one and never a part. An existing file is replaced. If `path` is a
+/// symbolic link, the file behind it is replaced and the link stays.
 ///
 /// # Errors
 /// Those of the disk, and the error that `write` returns. In each case the temporary file is removed and `path` keeps

@@ -121,3 +121,23 @@ impl World<'_> {
         (radiance, self.emitters.density_of_hit(ray.origin, ray.direction, &hit))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn allocations_keep_the_number_of_samples() {
+        for samples in [1, 2, 7, 64] {
+            for coverage in [0.0, 0.01, 0.3, 1.0] {
+                let Allocation { cosine, light } = Allocation::by_coverage(samples, coverage);
+                assert_eq!(cosine + light, samples);
+                // At least one cosine-distributed ray finds what sampling emitters cannot.
+                assert!(cosine >= 1);
+            }
+            assert_eq!(Allocation::by_coverage(samples, 1.0).light, 0);
+        }
+        assert_eq!(Allocation::by_coverage(64, 0.25), Allocation { cosine: 16, light: 48 });
+        assert_eq!(Allocation::by_coverage(0, 0.5), Allocation { cosine: 1, light: 0 });
+    }
+}

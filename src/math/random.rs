@@ -157,4 +157,17 @@ mod tests {
         // Standard error 1/√(12·4096) = 0.0045; five of them.
         assert!((mean - 0.5).abs() < 0.0226, "{mean}");
     }
+
+    #[test]
+    fn kronecker_points_fill_every_dimension_evenly() {
+        let mut random = Random::new(7, Purpose::Capture, 1, 0);
+        let n = 4096;
+        let points: Vec<[u32; 4]> = KroneckerSequence::new(&mut random).take(n).collect();
+        for dimension in 0..4 {
+            let mut count = [0; 64];
+            points.iter().for_each(|p| count[(p[dimension] >> 26) as usize] += 1);
+            // 64 points per interval. Of independent points one count in three deviates by more than 8; here none may.
+            assert!(count.iter().all(|c| (56..=72).contains(c)), "dimension {dimension}: {count:?}");
+        }
+    }
 }

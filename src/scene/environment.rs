@@ -70,3 +70,35 @@ impl Environment {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn map_and_inverse_agree(x in -1.0f32..1.0, y in -1.0f32..1.0, z in -1.0f32..1.0) {
+            let d = Vec3::new(x, y, z);
+            prop_assume!(d.length() > 1e-3);
+            let d = d.normalize();
+            let back = EnvironmentMap::direction(EnvironmentMap::uv(d));
+            // `acos` near the poles turns a rounding of 6e-8 into an angle of 3.5e-4.
+            prop_assert!(back.distance(d) < 1e-3, "{d} came back as {back}");
+        }
+    }
+
+    #[test]
+    fn directions_lie_where_the_documentation_says() {
+        let at = |d: Vec3| EnvironmentMap::uv(d);
+        assert!(at(Vec3::NEG_Z).distance(Vec2::new(0.5, 0.5)) < 1e-6);
+        assert!(at(Vec3::X).distance(Vec2::new(0.75, 0.5)) < 1e-6);
+        assert_eq!(at(Vec3::Y).y, 0.0);
+        assert_eq!(at(Vec3::NEG_Y).y, 1.0);
+        let map = EnvironmentMap { width: 4, height: 2, texels: (0..8).map(|i| Vec3::splat(i as f32)).collect() };
+        assert_eq!(map.radiance(Vec3::new(1.0, 0.1, -0.1).normalize()).x, 2.0);
+        // The lower pole belongs to the last row.
+        assert!((4..8).contains(&map.texel_index(Vec3::NEG_Y)));
+    }
+}

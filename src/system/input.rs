@@ -29,3 +29,23 @@ fn check_regular(path: &Path) -> io::Result<()> {
     }
     Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_regular_files_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        fs::write(&file, "content").unwrap();
+        assert_eq!(read_file(&file).unwrap(), b"content");
+        open_file(&file).unwrap();
+        // Reading these would never end, or would wait.
+        for path in [Path::new("/dev/zero"), folder.path()] {
+            assert_eq!(read_file(path).unwrap_err().kind(), io::ErrorKind::InvalidInput);
+            assert_eq!(open_file(path).unwrap_err().kind(), io::ErrorKind::InvalidInput);
+        }
+        assert_eq!(read_file(&folder.path().join("missing")).unwrap_err().kind(), io::ErrorKind::NotFound);
+    }
+}

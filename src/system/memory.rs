@@ -12,7 +12,7 @@ use super::format;
 pub struct TooLittleMemory {
     /// The flag or configuration key that causes most of the need.
     pub key: String,
-    /// What needs the memory, for example "the probes".
+    /// What needs the memory, for example "the pictures".
     pub what: &'static str,
     /// Bytes.
     pub needed: u64,

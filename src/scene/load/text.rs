@@ -24,3 +24,24 @@ pub(super) fn sentence(message: &str) -> String {
     let kept = line[..end].rsplit_once(' ').map_or(&line[..end], |(kept, _)| kept);
     format!("{} …", kept.escape_debug())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_stay_on_one_line() {
+        assert_eq!(label("mesh", 3, Some("Wall")), "mesh 3 'Wall'");
+        assert_eq!(label("mesh", 3, Some("")), "mesh 3");
+        assert_eq!(label("mesh", 3, Some("a\nb")), "mesh 3 'a\\nb'");
+        assert_eq!(short(&"ä".repeat(61)), format!("{}…", "ä".repeat(60)));
+        assert_eq!(short(&"ä".repeat(60)), "ä".repeat(60));
+    }
+
+    #[test]
+    fn long_messages_end_after_a_whole_word() {
+        assert_eq!(sentence("two\n  words"), "two words");
+        let cut = sentence(&"word ".repeat(100));
+        assert!(cut.ends_with("word …") && cut.chars().count() <= 242, "{cut}");
+    }
+}

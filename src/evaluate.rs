@@ -17,9 +17,9 @@ use crate::report::reference_layers::ReferenceLayers;
 use crate::report::render::{MethodReport, Spread};
 use crate::report::{error, leak};
 use crate::shade::layers::compose;
-use crate::shade::methods::{Method, exact_masks, irradiance, time_lookup, time_shading};
 use crate::shade::points::View;
 use crate::shade::regions::Region;
+use crate::shade::visibility_modes::{VisibilityMode, exact_masks, irradiance, time_lookup, time_shading};
 use crate::system::progress::Progress;
 
 /// Name in the report of probes lit by full paths, with exact visibility.
@@ -33,9 +33,9 @@ pub struct Scenery<'a, 's> {
     pub primary_s: f64,
 }
 
-/// One method's results.
+/// The picture and the figures of one visibility mode.
 pub struct Shaded {
-    pub method: Method,
+    pub mode: VisibilityMode,
     /// At every point of the view, W·m⁻².
     pub irradiance: Vec<Vec3>,
     pub report: MethodReport,
@@ -71,23 +71,23 @@ impl Scenery<'_, '_> {
         step: impl Fn(),
     ) -> [Shaded; 3] {
         let points = &self.view.points;
-        let exact = irradiance(query, points, masks, Method::Ray);
-        Method::ALL.map(|method| {
-            let irradiance = irradiance(query, points, masks, method);
-            let ray_s = if method == Method::Ray { self.primary_s + masks_s } else { self.primary_s };
+        let exact = irradiance(query, points, masks, VisibilityMode::Ray);
+        VisibilityMode::ALL.map(|mode| {
+            let irradiance = irradiance(query, points, masks, mode);
+            let ray_s = if mode == VisibilityMode::Ray { self.primary_s + masks_s } else { self.primary_s };
             let report = MethodReport {
-                name: method.name(),
-                shade_ms: Spread::of(time_shading(query, points, masks, method)),
+                name: mode.name(),
+                shade_ms: Spread::of(time_shading(query, points, masks, mode)),
                 ray_ms: ray_s * 1e3,
-                lookup_ns: time_lookup(query, points, masks, method),
+                lookup_ns: time_lookup(query, points, masks, mode),
                 bytes_per_probe,
                 irradiance_indirect_mean: mean_luminance(self.view, &irradiance),
-                leak: leak::measure(query, points, masks, method, &irradiance, &exact),
+                leak: leak::measure(query, points, masks, mode, &irradiance, &exact),
                 error: None,
                 error_gltf: None,
             };
             step();
-            Shaded { method, image: compose(self.view, &irradiance), irradiance, report }
+            Shaded { mode, image: compose(self.view, &irradiance), irradiance, report }
         })
     }
 
@@ -96,20 +96,24 @@ impl Scenery<'_, '_> {
         &self,
         query: &Query,
         masks: &[u8],
-        method: Method,
+        mode: VisibilityMode,
         name: &'static str,
         like: &MethodReport,
     ) -> Shaded {
         let points = &self.view.points;
-        let shown = irradiance(query, points, masks, method);
-        let exact = if method == Method::Ray { shown.clone() } else { irradiance(query, points, masks, Method::Ray) };
+        let shown = irradiance(query, points, masks, mode);
+        let exact = if mode == VisibilityMode::Ray {
+            shown.clone()
+        } else {
+            irradiance(query, points, masks, VisibilityMode::Ray)
+        };
         let report = MethodReport {
             name,
             irradiance_indirect_mean: mean_luminance(self.view, &shown),
-            leak: leak::measure(query, points, masks, method, &shown, &exact),
+            leak: leak::measure(query, points, masks, mode, &shown, &exact),
             ..like.clone()
         };
-        Shaded { method, image: compose(self.view, &shown), irradiance: shown, report }
+        Shaded { mode, image: compose(self.view, &shown), irradiance: shown, report }
     }
 }
 

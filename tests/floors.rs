@@ -63,6 +63,9 @@ impl<'ast> Visit<'ast> for Named<'_> {
         visit::visit_path(self, path);
     }
 
+    /// `pub(super)` names a folder to limit who may import, and imports nothing itself.
+    fn visit_vis_restricted(&mut self, _: &'ast syn::VisRestricted) {}
+
     fn visit_item_mod(&mut self, item: &'ast syn::ItemMod) {
         if !item.attrs.iter().any(|a| a.path().is_ident("cfg")) {
             visit::visit_item_mod(self, item);

@@ -17,7 +17,7 @@ use crate::math::blocks::BLOCK;
 use crate::report::reference::{NoiseReport, Rays, ReferenceReport, ReferenceTimes, SCHEMA};
 use crate::report::table::{Column, Table};
 use crate::scene::Camera;
-use crate::shade::film::Noise;
+use crate::shade::film::NoiseLevel;
 use crate::shade::points::has_blend;
 use crate::shade::reference::{Reference, ReferenceSettings, State, Tracing};
 use crate::shade::reference_file::{Identity, resume};
@@ -203,7 +203,7 @@ pub(super) fn trace(tracing: &mut Tracing, path: &Path, identity: &Identity, con
     Ok((started.elapsed() - saving).as_secs_f64())
 }
 
-fn noise_report(noise: Noise) -> NoiseReport {
+fn noise_report(noise: NoiseLevel) -> NoiseReport {
     NoiseReport {
         mean: noise.mean,
         mean_standard_error: noise.mean_standard_error,

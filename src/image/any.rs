@@ -1,4 +1,4 @@
-//! Any picture on disk as its numbers: layers of OpenEXR, Radiance HDR, PNG of 8 and 16 bits.
+//! Reading the numbers of a picture in any supported format: layers of OpenEXR, Radiance HDR, PNG of 8 and 16 bits.
 
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -15,24 +15,25 @@ use crate::system::input::open_file;
 
 /// First bytes of an OpenEXR file.
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
-/// First bytes of a Radiance file, whatever program wrote it.
+/// First bytes of a Radiance file. Programs differ in the bytes after them.
 const HDR_MAGIC: [u8; 2] = *b"#?";
 
-/// What a picture says about itself before its pixels are read.
+/// The header of a picture, which is read without its pixels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImageHeader {
     pub width: u32,
     pub height: u32,
-    /// One named `beauty` where there are no names.
+    /// Names of the layers. A picture without names has one layer, `beauty`.
     pub layers: Vec<String>,
-    /// Whether the numbers are codes for a screen (PNG: code ÷ largest code, sRGB as it stands) and not light.
+    /// Whether the numbers are display codes instead of linear light. A PNG's are sRGB codes ÷ the largest code.
     pub is_display: bool,
 }
 
-/// A picture's numbers.
+/// The numbers of a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AnyImage {
     pub image: LayeredImage,
+    /// As [`ImageHeader::is_display`].
     pub is_display: bool,
 }
 
@@ -43,8 +44,10 @@ enum Format {
 }
 
 impl ImageHeader {
+    /// Reads the header of a file.
+    ///
     /// # Errors
-    /// A file that cannot be opened, is damaged, or is of another format.
+    /// The file cannot be opened, is damaged, or has another format.
     pub fn read(path: &Path) -> Result<ImageHeader, ImageError> {
         let plain =
             |(width, height), is_display| ImageHeader { width, height, layers: vec![BEAUTY.to_owned()], is_display };
@@ -66,10 +69,10 @@ impl ImageHeader {
 }
 
 impl AnyImage {
-    /// Reads the layers that are wanted. Transparency is dropped; grey becomes RGB.
+    /// Reads the layers whose names `is_wanted` accepts. Transparency is dropped, and grey becomes RGB.
     ///
     /// # Errors
-    /// A file that cannot be opened, is damaged, or is of another format.
+    /// The file cannot be opened, is damaged, or has another format.
     pub fn read(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<AnyImage, ImageError> {
         match format_of(path)? {
             Format::Exr => Ok(AnyImage { image: LayeredImage::read_exr_layers(path, is_wanted)?, is_display: false }),
@@ -100,7 +103,7 @@ fn open(path: &Path) -> Result<BufReader<File>, ImageError> {
     Ok(BufReader::new(file))
 }
 
-/// By the first bytes: names lie.
+/// The format by the file's first bytes, because the extension of its name may be wrong.
 fn format_of(path: &Path) -> Result<Format, ImageError> {
     let mut start = Vec::new();
     let read = open(path)?.take(4).read_to_end(&mut start);
@@ -108,7 +111,7 @@ fn format_of(path: &Path) -> Result<Format, ImageError> {
     Ok(match &start[..] {
         start if *start == EXR_MAGIC => Format::Exr,
         start if start.starts_with(&HDR_MAGIC) => Format::Hdr,
-        // What is none of the three fails as a PNG, with the reason.
+        // A file of any other format fails in the PNG decoder, which gives the reason.
         _ => Format::Png,
     })
 }

@@ -1,4 +1,4 @@
-//! What can go wrong with pictures on disk.
+//! Errors of reading and writing pictures.
 
 use std::io;
 use std::path::PathBuf;
@@ -27,7 +27,7 @@ pub enum ImageError {
         "cannot write {path}: the layer name {name:?} is not 1 to 200 ASCII letters, digits or underscores; rename it"
     )]
     LayerName { path: PathBuf, name: String },
-    #[error("cannot write {path}: a picture of {width} × {height} pixels has none; give it a size")]
+    #[error("cannot write {path}: the picture has no pixels ({width} × {height}); give it a size")]
     Empty { path: PathBuf, width: u32, height: u32 },
     #[error(transparent)]
     Output(#[from] OutputError),

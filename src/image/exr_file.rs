@@ -1,7 +1,8 @@
 //! An opened OpenEXR file and its blocks of pixels, in order.
 //!
-//! No header is believed: what it makes the decoder allocate is bounded by the file's size, or by the block's. Blocks are decompressed
-//! on rayon's threads and not on those of the decoder, where a damaged block is a lost worker instead of an error.
+//! A header may claim any size. The memory that it makes the decoder allocate is therefore bounded by the size of the
+//! file or of the block. Blocks are decompressed on rayon's threads: on the decoder's own threads a damaged block would
+//! end a thread instead of returning an error.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -20,42 +21,44 @@ use crate::system::input::open_file;
 
 const FORMAT: &str = "OpenEXR";
 
-/// Bytes that a byte of a file can stand for: deflate's bound is 1032 (RFC 1951: 258 bytes in 2 bits), doubled for headroom.
-/// The Huffman runs of PIZ (512 bytes in 10 bits) and the other methods stay below.
+/// Largest expansion of a compressed byte. Deflate reaches 1032 (RFC 1951: 258 bytes in 2 bits); it is doubled for
+/// headroom. The Huffman runs of PIZ (512 bytes in 10 bits) and the other compressions stay below.
 const MAX_EXPANSION: u64 = 2 * 1032;
 
-/// DWA stores a flat block of 8 × 8 samples as one number before it deflates, which gains at most this much more.
+/// Largest expansion of DWA. Before it deflates, DWA stores a flat block of 8 × 8 samples as one number: a factor of
+/// 64.
 const MAX_EXPANSION_DWA: u64 = 64 * MAX_EXPANSION;
 
-/// A picture of this size is never refused for its file's: 4096 × 2048 black pixels in DWA are a thousand bytes.
+/// Decoded pictures up to this size are accepted from a file of any size: 4096 × 2048 black pixels take about a
+/// thousand bytes in DWA.
 const HARMLESS_BYTES: u64 = 64 << 20;
 
-/// Bytes that every block takes at least: its entry in the table of offsets (8), its coordinate (4) and its length (4).
+/// Least bytes of a block: its entry in the table of offsets (8), its coordinate (4) and its length (4).
 const MIN_BLOCK_BYTES: u64 = 16;
 
-/// Pixels that a picture may have: 32768 × 16384, an environment map twice as fine as the finest in circulation.
+/// Most pixels of a picture: 32768 × 16384, an environment map with twice the resolution of the finest in circulation.
 const MAX_PIXELS: u64 = 1 << 29;
 
-/// Counters that a block of DWA starts with, 64 bits each (OpenEXR, `internal_dwa_compressor.h`); the first is a version and the
-/// last a method, the others are sizes.
+/// Number of counters at the start of a DWA block, 64 bits each (OpenEXR, `internal_dwa_compressor.h`). The first is a
+/// version and the last the kind of compression; the others are sizes.
 const DWA_COUNTERS: usize = 11;
 
-/// Side of DWA's blocks of samples: edges are padded to it.
+/// Side of DWA's squares of samples. Pictures are padded to a multiple of it.
 const DWA_BLOCK: usize = 8;
 
-/// A file whose headers have been read and found plausible.
+/// A file whose headers have been read and checked against the file's size.
 pub(super) struct ExrFile<'a> {
     path: &'a Path,
     reader: Reader<BufReader<File>>,
 }
 
 impl<'a> ExrFile<'a> {
-    /// Opens the file and refuses headers that it is too short for.
+    /// Opens the file. Refuses headers that claim more than a file of this size can hold.
     pub(super) fn open(path: &'a Path) -> Result<ExrFile<'a>, ImageError> {
         let open_error = |cause| ImageError::Open { path: path.to_owned(), cause };
         let file = open_file(path).map_err(open_error)?;
         let file_bytes = file.metadata().map_err(open_error)?.len();
-        // Relaxed: real files bend the rules of the header. The data is held to them.
+        // `false` accepts headers that break minor rules, because files in use do. Data is still read strictly.
         let reader = exr::block::read(BufReader::new(file), false).map_err(|error| exr_error(path, error))?;
         for header in reader.headers() {
             if !is_plausible(header, file_bytes) {
@@ -70,7 +73,7 @@ impl<'a> ExrFile<'a> {
         self.reader.headers()
     }
 
-    /// Hands over each block of one part's full resolution, decompressed.
+    /// Calls `take` with each decompressed block of one part, at full resolution.
     pub(super) fn for_each_block(
         self,
         part: usize,
@@ -85,7 +88,7 @@ impl<'a> ExrFile<'a> {
                 .reader
                 .filter_chunks(true, |_, tile, block| is_wanted(block.layer, tile.is_largest_resolution_level()))?;
             let mut chunks = chunks.into_iter();
-            // A few blocks at a time: each thread has one, and no more than these are in memory.
+            // One block per thread at a time bounds the memory.
             loop {
                 let batch: Vec<Chunk> = chunks.by_ref().take(rayon::current_num_threads()).collect::<ExrResult<_>>()?;
                 if batch.is_empty() {
@@ -120,7 +123,7 @@ fn is_dwa(header: &Header) -> bool {
     matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_))
 }
 
-/// Refuses blocks of DWA whose own counters claim more than the block can hold: the decoder would allocate on their word.
+/// Refuses a DWA block whose counters claim more data than its pixels can have. The decoder would allocate that much.
 fn check_block(header: &Header, block: &CompressedBlock) -> ExrResult<()> {
     let bytes = match block {
         CompressedBlock::ScanLine(lines) => &lines.compressed_pixels_le,
@@ -131,12 +134,12 @@ fn check_block(header: &Header, block: &CompressedBlock) -> ExrResult<()> {
         return Ok(());
     }
     let size = header.get_absolute_block_pixel_coordinates(header.get_block_data_indices(block)?)?.size;
-    // What did not get smaller is stored as it was, without counters.
+    // A block that compression did not shrink is stored uncompressed and has no counters.
     if bytes.len() == size.area() * header.channels.bytes_per_pixel {
         return Ok(());
     }
     let padded = size.width().next_multiple_of(DWA_BLOCK) * size.height().next_multiple_of(DWA_BLOCK);
-    // Twice: runs of bytes that do not repeat grow a little.
+    // Doubled, because data without repetition grows a little when it is encoded.
     let limit = 2 * padded as u64 * header.channels.bytes_per_pixel as u64;
     let (counters, _) = bytes.as_chunks::<8>();
     let sizes = counters.iter().take(DWA_COUNTERS - 1).skip(1).map(|counter| u64::from_le_bytes(*counter));

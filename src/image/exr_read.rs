@@ -1,4 +1,4 @@
-//! OpenEXR, read: the plain R, G, B of any flat file, and all layers of the files that `exr_write` wrote.
+//! Reading OpenEXR: the plain R, G, B of any flat file, and all layers of files that `exr_write` wrote.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -14,12 +14,13 @@ use super::exr_file::ExrFile;
 use super::layered::{BEAUTY, LayeredImage, STATE, TEXTS};
 use super::picture::Picture;
 
-/// Name of the layer of the plain channels, while a file is being read.
+/// Name of the plain channels R, G, B as a layer, while a file is being read.
 const PLAIN: &str = "";
 
-/// One layer while it is being read: which channels of the file it consists of, and its pixels.
+/// One layer while it is being read.
 struct Layer {
     name: String,
+    /// Indices of its R, G and B among the channels of the file.
     channels: [usize; 3],
     pixels: Vec<Vec3>,
 }
@@ -28,7 +29,7 @@ impl Picture {
     /// Reads the channels R, G, B (16-bit or 32-bit) of the first part that has them.
     ///
     /// # Errors
-    /// A file that cannot be opened, is damaged, is deep or subsampled, or has no such channels.
+    /// The file cannot be opened, is damaged, is deep or subsampled, or has no such channels.
     pub fn read_exr(path: &Path) -> Result<Picture, ImageError> {
         let file = ExrFile::open(path)?;
         let plain_in = |(part, header)| Some((part, layers_of(header).remove(PLAIN)?));
@@ -43,17 +44,18 @@ impl Picture {
 }
 
 impl LayeredImage {
-    /// Reads every layer that has the three channels `layer.R`, `layer.G`, `layer.B`, sorted by name, from the first part that has
-    /// any colour, and what [`LayeredImage::write_exr`] wrote of words and texts. A part with plain R, G, B only gives the one layer
-    /// `beauty`.
+    /// Reads the first part that has colour: every layer with the three channels `layer.R`, `layer.G`, `layer.B`,
+    /// sorted by name, and the words and texts that [`LayeredImage::write_exr`] wrote. If the part has only plain R, G,
+    /// B, they become the layer `beauty`.
     ///
     /// # Errors
-    /// A file that cannot be opened, is damaged, is deep or subsampled, or has no colour at all.
+    /// The file cannot be opened, is damaged, is deep or subsampled, or has no colour.
     pub fn read_exr(path: &Path) -> Result<LayeredImage, ImageError> {
         LayeredImage::read_exr_layers(path, |_| true)
     }
 
-    /// The same with only those layers that are wanted, by name: pictures of many layers are large.
+    /// Like [`LayeredImage::read_exr`], but reads only the layers whose names `is_wanted` accepts. A picture of many
+    /// layers is large.
     ///
     /// # Errors
     /// As those of [`LayeredImage::read_exr`].
@@ -76,10 +78,10 @@ impl LayeredImage {
     }
 }
 
-/// Width, height, and the names of the layers that [`LayeredImage::read_exr`] would read, from the header alone.
+/// Width, height, and the names of the layers that [`LayeredImage::read_exr`] would read. Reads the header only.
 ///
 /// # Errors
-/// As those of [`LayeredImage::read_exr`], pixels apart.
+/// As those of [`LayeredImage::read_exr`], except damage to the pixels.
 pub fn read_exr_header(path: &Path) -> Result<(u32, u32, Vec<String>), ImageError> {
     let file = ExrFile::open(path)?;
     let (part, layers) = colored_part(path, &file)?;
@@ -88,20 +90,20 @@ pub fn read_exr_header(path: &Path) -> Result<(u32, u32, Vec<String>), ImageErro
     Ok((size.width() as u32, size.height() as u32, layers.into_keys().map(named).collect()))
 }
 
-/// The first part that has any colour, and its layers.
+/// Index of the first part that has colour, and its layers as [`layers_of`] gives them.
 fn colored_part(path: &Path, file: &ExrFile<'_>) -> Result<(usize, BTreeMap<String, [usize; 3]>), ImageError> {
     let colored = |(part, header)| Some((part, layers_of(header))).filter(|(_, layers)| !layers.is_empty());
     let Some((part, mut layers)) = file.headers().iter().enumerate().find_map(colored) else {
         return Err(no_color(path, file.headers()));
     };
-    // Beside named layers the plain channels are a second copy of one of them.
+    // If there are named layers, the plain channels repeat one of them.
     if layers.len() > 1 {
         layers.remove(PLAIN);
     }
     Ok((part, layers))
 }
 
-/// The layers of a part that have all three channels, by name: the channels' places in the file.
+/// The layers of a part that have all three channels: from the name to the indices of R, G and B in the file.
 fn layers_of(header: &Header) -> BTreeMap<String, [usize; 3]> {
     let mut found: BTreeMap<String, [Option<usize>; 3]> = BTreeMap::new();
     for (place, channel) in header.channels.list.iter().enumerate() {
@@ -115,7 +117,7 @@ fn layers_of(header: &Header) -> BTreeMap<String, [usize; 3]> {
     found.into_iter().filter_map(whole).collect()
 }
 
-/// The part's channels of words, by name: their places in the file.
+/// The part's channels of words: from the name to the index in the file.
 fn words_of(header: &Header) -> BTreeMap<String, usize> {
     let words = |(place, channel): (usize, &ChannelDescription)| {
         let name = channel.name.to_string().strip_prefix(STATE)?.to_owned();
@@ -124,7 +126,7 @@ fn words_of(header: &Header) -> BTreeMap<String, usize> {
     header.channels.list.iter().enumerate().filter_map(words).collect()
 }
 
-/// The part's texts; none where they are not what `exr_write` writes.
+/// The part's texts. The result is empty if the part has none in the form that `exr_write` writes.
 fn texts_of(header: &Header) -> BTreeMap<String, String> {
     match header.own_attributes.other.get(&Text::from(TEXTS)) {
         Some(AttributeValue::Text(json)) => serde_json::from_slice(json.as_slice()).unwrap_or_default(),
@@ -146,7 +148,7 @@ fn read_layers(
     let blank = |(name, channels)| Layer { name, channels, pixels: vec![Vec3::ZERO; size.area()] };
     let mut layers: Vec<Layer> = wanted.into_iter().map(blank).collect();
     let mut words: Vec<Vec<u32>> = wanted_words.values().map(|_| vec![0; size.area()]).collect();
-    // Where each channel of the file goes to.
+    // The destination of each channel of the file.
     let mut targets = vec![None; channels.list.len()];
     for (index, layer) in layers.iter().enumerate() {
         for (component, &channel) in layer.channels.iter().enumerate() {
@@ -177,14 +179,15 @@ fn read_layers(
     Ok((layers, wanted_words.into_keys().zip(words).collect()))
 }
 
-/// Where a channel's samples go.
+/// The destination of a channel's samples.
 #[derive(Debug, Clone, Copy)]
 enum Target {
     Layer { index: usize, component: usize },
     Words { index: usize },
 }
 
-/// Decompressed lines are in the machine's own byte order and as long as their pixels: the decoder has made sure.
+/// Copies one channel of a line into a row of pixels. The decoder guarantees that decompressed lines have the machine's
+/// byte order and the length of the row.
 fn read_line(line: &LineRef<'_>, sample_type: SampleType, row: &mut [Vec3], component: usize) {
     fn fill<const N: usize>(bytes: &[u8], row: &mut [Vec3], component: usize, value: impl Fn([u8; N]) -> f32) {
         for (pixel, &sample) in row.iter_mut().zip(bytes.as_chunks::<N>().0) {

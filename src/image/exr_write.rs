@@ -1,6 +1,6 @@
-//! OpenEXR, written: one part, scan lines, 32-bit float, ZIP in blocks of 16 lines. Undone by `exr_read`.
+//! Writing OpenEXR: one part, scan lines, 32-bit float, ZIP in blocks of 16 lines. Undone by `exr_read`.
 //!
-//! The same image gives the same bytes: lines are in increasing order, and no date and no path is stored.
+//! The same image gives the same bytes, because lines are in increasing order and neither date nor path is stored.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -18,10 +18,10 @@ use super::layered::{LayeredImage, STATE, TEXTS};
 use super::picture::Picture;
 use crate::system::output::write_atomically;
 
-/// EXR limits a channel's name to 255 bytes; this leaves room for ".R".
+/// EXR limits a channel's name to 255 bytes. This limit leaves room for endings such as ".R".
 const MAX_NAME_BYTES: usize = 200;
 
-/// What stands for a layer's name where its channels have none.
+/// Layer name of the plain channels R, G, B.
 const PLAIN: &str = "";
 
 /// Primaries and white point D65 of Rec. 709 (ITU-R BT.709-6, items 1.3 and 1.4), CIE xy.
@@ -33,8 +33,8 @@ const REC_709: Chromaticities = Chromaticities {
 };
 
 impl LayeredImage {
-    /// Writes all layers, sorted by channel name as EXR demands, and plain R, G, B for the layer `beauty` (the first layer where
-    /// there is none of that name).
+    /// Writes all layers, sorted by channel name as EXR demands. The layer `beauty` is also written as plain R, G, B,
+    /// which other programs show; without a layer of that name the first layer is.
     ///
     /// # Errors
     /// Those of [`write_atomically`], no pixels, no layers, and names that are not plain identifiers.
@@ -63,7 +63,7 @@ impl Picture {
     }
 }
 
-/// Layer names become parts of channel names, where a dot separates.
+/// Whether a layer may have this name. Layer names become parts of channel names, in which a dot is the separator.
 fn is_identifier(name: &str) -> bool {
     (1..=MAX_NAME_BYTES).contains(&name.len()) && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
 }
@@ -94,8 +94,8 @@ fn write_channels(
     let mut attributes =
         LayerAttributes { software_name: Some(Text::from("lightprobe")), ..LayerAttributes::default() };
     if !texts.is_empty() {
-        // One attribute, because the crate writes several in random order; its texts are bytes, here UTF-8. Plain
-        // texts by name: nothing in them can fail to serialise.
+        // All texts share one attribute, because the crate writes several in random order. The attribute's bytes are
+        // UTF-8. Serialising a map of strings cannot fail.
         let json = serde_json::to_vec(texts).unwrap_or_default();
         attributes.other.insert(Text::from(TEXTS), AttributeValue::Text(Text::from_slice_unchecked(&json)));
     }

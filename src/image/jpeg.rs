@@ -1,4 +1,4 @@
-//! JPEG, for small stand-ins of pictures in pages: never for what is measured.
+//! JPEG, for small previews in HTML pages. No figure is measured from one.
 
 use std::io::{self, Write};
 
@@ -7,14 +7,14 @@ use image::{ExtendedColorType, ImageEncoder};
 
 use super::picture::Picture8;
 
-/// 1 to 100: edges stay clean and files small.
+/// JPEG quality, 1 to 100. At this value edges stay clean and files small.
 const QUALITY: u8 = 85;
 
 impl Picture8 {
-    /// The bytes of a JPEG, lossy.
+    /// Writes the picture as JPEG, which is lossy.
     ///
     /// # Errors
-    /// Those of `writer`, and a picture without pixels or with a side beyond 65,535.
+    /// Those of `writer`, a picture without pixels, and a side above 65,535.
     pub fn encode_jpeg(&self, writer: impl Write) -> io::Result<()> {
         let encoder = JpegEncoder::new_with_quality(writer, QUALITY);
         let bytes = self.pixels.as_flattened();

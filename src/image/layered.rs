@@ -6,26 +6,27 @@ use glam::Vec3;
 
 use super::picture::Picture;
 
-/// Name of the layer that plain viewers show.
+/// Name of the layer that viewers without support for layers show.
 pub(super) const BEAUTY: &str = "beauty";
 
-/// Start of the channel names of words.
+/// Prefix of the channel names of words.
 pub(super) const STATE: &str = "state.";
 
 /// Name of the attribute that holds the texts, as JSON.
 pub(super) const TEXTS: &str = "lightprobe";
 
-/// Layers of one size, in the order in which they were added; each linear RGB, row 0 at the top.
+/// Layers of one size, in the order in which they were added. Each is linear RGB with row 0 at the top.
 ///
-/// On disk one EXR part with the channels `layer.R`, `layer.G`, `layer.B`, and plain `R`, `G`, `B` for the layer `beauty`;
-/// `state.name` for words, and the texts as one attribute.
+/// On disk this is one EXR part. A layer has the channels `layer.R`, `layer.G`, `layer.B`; the layer `beauty` is also
+/// stored as plain `R`, `G`, `B`. Words have the channel `state.name`. All texts share one attribute.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayeredImage {
     pub width: u32,
     pub height: u32,
-    /// What else there is to say about the picture, by name.
+    /// Metadata of the picture, by name.
     pub texts: BTreeMap<String, String>,
     layers: Vec<(String, Vec<Vec3>)>,
+    /// See [`LayeredImage::push_words`].
     words: BTreeMap<String, Vec<u32>>,
 }
 
@@ -34,10 +35,10 @@ impl LayeredImage {
         LayeredImage { width, height, texts: BTreeMap::new(), layers: Vec::new(), words: BTreeMap::new() }
     }
 
-    /// Adds a layer of colours; a layer of the same name is replaced in its place.
+    /// Adds a layer of colours. A layer of the same name is replaced and keeps its position.
     ///
     /// # Panics
-    /// When `pixels` does not hold `width · height` of them.
+    /// If the number of `pixels` is not `width · height`.
     pub fn push(&mut self, name: &str, pixels: Vec<Vec3>) {
         assert_eq!(pixels.len(), self.width as usize * self.height as usize, "pixels of the layer {name}");
         match self.layers.iter_mut().find(|(existing, _)| existing == name) {
@@ -46,24 +47,25 @@ impl LayeredImage {
         }
     }
 
-    /// Adds a layer of single values, such as depth in metres: R, G and B are equal. Undone by [`LayeredImage::scalar`].
+    /// Adds a layer of single values, such as depth in metres. R, G and B are equal. Undone by
+    /// [`LayeredImage::scalar`].
     ///
     /// # Panics
-    /// When `values` does not hold `width · height` of them.
+    /// If the number of `values` is not `width · height`.
     pub fn push_scalar(&mut self, name: &str, values: &[f32]) {
         self.push(name, values.iter().map(|&value| Vec3::splat(value)).collect());
     }
 
-    /// Adds a word for every pixel that is no colour to look at: what a later run needs to go on.
+    /// Adds one 32-bit word per pixel. Words are data for a later run that continues this one, not colours.
     ///
     /// # Panics
-    /// When `words` does not hold `width · height` of them.
+    /// If the number of `words` is not `width · height`.
     pub fn push_words(&mut self, name: &str, words: Vec<u32>) {
         assert_eq!(words.len(), self.width as usize * self.height as usize, "words of {name}");
         self.words.insert(name.to_owned(), words);
     }
 
-    /// What [`LayeredImage::push_words`] was given under this name.
+    /// The words that [`LayeredImage::push_words`] stored under this name.
     pub fn words(&self, name: &str) -> Option<&[u32]> {
         self.words.get(name).map(Vec::as_slice)
     }
@@ -92,7 +94,7 @@ impl LayeredImage {
         self.layers.iter().find(|(existing, _)| existing == name).map(|(_, pixels)| pixels.as_slice())
     }
 
-    /// One layer's first channel: the values that [`LayeredImage::push_scalar`] was given.
+    /// The first channel of a layer: the values that [`LayeredImage::push_scalar`] stored.
     pub fn scalar(&self, name: &str) -> Option<Vec<f32>> {
         self.layer(name).map(|pixels| pixels.iter().map(|pixel| pixel.x).collect())
     }
@@ -102,7 +104,7 @@ impl LayeredImage {
         self.layer(name).map(|pixels| Picture::from_pixels(self.width, self.height, pixels.to_vec()))
     }
 
-    /// The layer whose channels are also written as plain R, G, B: `beauty`, else the first.
+    /// The layer that is also written as plain R, G, B: `beauty`, or the first layer if there is no `beauty`.
     pub(super) fn plain_layer(&self) -> Option<&[Vec3]> {
         self.layer(BEAUTY).or_else(|| self.layers.first().map(|(_, pixels)| pixels.as_slice()))
     }

@@ -1,4 +1,4 @@
-//! Pictures: linear ones in EXR, displayable ones in PNG, and the one way from the first to the second.
+//! Pictures: linear light in EXR files, display codes in PNG files, and the conversion from the first to the second.
 
 mod any;
 mod error;

@@ -14,7 +14,7 @@ use crate::system::output::write_atomically;
 const FORMAT: &str = "PNG";
 
 impl Picture8 {
-    /// Writes an RGB PNG; the same picture gives the same bytes.
+    /// Writes an RGB PNG. The same picture gives the same bytes.
     ///
     /// # Errors
     /// Those of [`write_atomically`], and a picture without pixels.
@@ -25,7 +25,7 @@ impl Picture8 {
         Ok(write_atomically(path, |file| self.encode_png(file))?)
     }
 
-    /// The bytes of the PNG, for pages that hold their pictures in themselves. Undone by [`Picture8::read_png`].
+    /// Writes the PNG into any writer, for HTML pages that embed their pictures. Undone by [`Picture8::read_png`].
     ///
     /// # Errors
     /// Those of `writer`.
@@ -41,7 +41,7 @@ impl Picture8 {
     /// Reads a PNG of any kind: grey becomes RGB, 16 bits become 8, transparency is dropped.
     ///
     /// # Errors
-    /// A file that cannot be opened, is damaged, or is larger than the decoder's limit of 512 MiB.
+    /// The file cannot be opened, is damaged, or exceeds the decoder's limit of 512 MiB.
     pub fn read_png(path: &Path) -> Result<Picture8, ImageError> {
         let file = open_file(path).map_err(|cause| ImageError::Open { path: path.to_owned(), cause })?;
         let decoded = ImageReader::with_format(BufReader::new(file), ImageFormat::Png).decode().map_err(|error| {

@@ -1,4 +1,4 @@
-//! How a surface scatters light, as one value for every model of transport.
+//! Reflection at a surface. One type, [`Bsdf`], covers both reflection models.
 
 use std::f32::consts::PI;
 
@@ -12,25 +12,25 @@ use crate::math::color::luminance;
 use crate::math::random::Numbers;
 use crate::math::sampling::{cosine_hemisphere, cosine_hemisphere_density};
 
-/// Which model of reflection paths follow.
+/// The reflection model of paths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Transport {
-    /// Every surface Lambertian with its diffuse albedo: what probes hold.
+    /// Every surface is Lambertian with its diffuse albedo. Probes store this light.
     #[default]
     Lambert,
-    /// Metallic-roughness: [`Layered`].
+    /// The metallic-roughness model of glTF, [`Layered`].
     Gltf,
 }
 
-/// A surface's BRDF around one normal, for one viewer.
+/// The BRDF of a surface for one normal and one view direction.
 #[derive(Debug, Clone, Copy)]
 pub enum Bsdf {
     Lambert { normal: Vec3, albedo: Vec3 },
     Gltf(Layered),
 }
 
-/// BRDF × cosine towards one direction, sr⁻¹, in its two parts.
+/// The two parts of BRDF × cosine for one light direction, sr⁻¹.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Scattered {
     pub diffuse: Vec3,
@@ -54,7 +54,8 @@ impl Bsdf {
         }
     }
 
-    /// The same, sampled so that whatever arrives is found with bounded weight: for estimates of irradiance.
+    /// The same BRDF with other sampling: at least half of the samples are cosine-distributed. Estimates of irradiance
+    /// need this. Irradiance counts all directions, and the weights of its samples must stay bounded.
     #[inline]
     pub fn covering(self) -> Bsdf {
         match self {
@@ -74,7 +75,7 @@ impl Bsdf {
         }
     }
 
-    /// Whether nothing is reflected, whatever arrives.
+    /// Whether the surface reflects nothing.
     #[inline]
     pub fn is_black(&self) -> bool {
         match self {
@@ -83,7 +84,7 @@ impl Bsdf {
         }
     }
 
-    /// BRDF × cosine for light from unit `direction`; `cosine` > 0 is that to the normal.
+    /// BRDF × cosine for light from unit `direction`. `cosine` > 0 is the cosine between `direction` and the normal.
     #[inline]
     pub fn scattered(&self, direction: Vec3, cosine: f32) -> Scattered {
         match self {
@@ -92,7 +93,8 @@ impl Bsdf {
         }
     }
 
-    /// Density with which [`Self::sample`] draws `direction`, sr⁻¹; `cosine` > 0 is that to the normal.
+    /// Density with which [`Self::sample`] draws `direction`, sr⁻¹. `cosine` > 0 is the cosine between `direction` and
+    /// the normal.
     #[inline]
     pub fn density(&self, direction: Vec3, cosine: f32) -> f32 {
         match self {
@@ -101,7 +103,8 @@ impl Bsdf {
         }
     }
 
-    /// A direction in which much is reflected; its density is [`Self::density`]. It may lie below the surface.
+    /// A random light direction, preferably one from which much light is reflected. Its density is [`Self::density`].
+    /// It may lie below the surface.
     #[inline]
     pub fn sample(&self, numbers: &mut impl Numbers) -> Vec3 {
         match self {
@@ -111,26 +114,28 @@ impl Bsdf {
     }
 }
 
-/// Bounds of the share of samples that a lobe gets where there are two: neither is starved when the estimate of their
-/// strength is wrong.
+/// Least share of samples for each of two lobes. The estimate of their strengths may be wrong, and without this bound
+/// one lobe could get no samples.
 const LEAST_SHARE: f32 = 0.1;
 
-/// Most samples for the glossy lobe where irradiance is estimated too.
+/// Largest share of samples for the glossy lobe when irradiance is estimated too ([`Bsdf::covering`]).
 const COVERING_GLOSSY_SHARE: f32 = 0.5;
 
-/// A diffuse base under the glossy lobe of [`Ggx`], as glTF's metallic-roughness has it: F0 = mix(0.04, baseColor,
-/// metallic), diffuse albedo ρ = baseColor·(1 − metallic).
+/// A diffuse base under the glossy lobe of [`Ggx`], with the parameters of glTF's metallic-roughness model: F0 =
+/// mix(0.04, baseColor, metallic) and diffuse albedo ρ = baseColor·(1 − metallic).
 ///
-/// The base gets what the lobe lets in and out: ρ/π·(1 − F(n·l))·(1 − F(n·v)) with Schlick's F. The weight 1 − F(v·h) of
-/// glTF's appendix B, with the half vector of the very directions, would not do: seen at grazing angles the lobe reflects
-/// nearly all, and the base, whose half vectors are steep, nearly all once more; together up to 1.8 of what arrives. With
-/// the normal's angles the sum stays below 1 (a test has it), and light and viewer may still change places.
+/// The base reflects the light that the lobe lets in and out: ρ/π·(1 − F(n·l))·(1 − F(n·v)) with Schlick's F.
+///
+/// The weight 1 − F(v·h) of glTF's appendix B would create energy. At grazing views the lobe reflects nearly all light.
+/// But v·h is large for most light directions, so F(v·h) is small and the base reflects nearly all light again.
+/// Together they reflect up to 1.8 times the incident light. With the angles to the normal the sum stays below 1, which
+/// a test checks. The model stays reciprocal.
 #[derive(Debug, Clone, Copy)]
 pub struct Layered {
     normal: Vec3,
     tangent: Vec3,
     bitangent: Vec3,
-    /// Towards the viewer in the frame of the three above.
+    /// View direction in the frame (tangent, bitangent, normal).
     view: Vec3,
     ggx: Ggx,
     /// ρ·(1 − F(n·v)).
@@ -148,7 +153,7 @@ impl Layered {
         let (roughness, metallic) = scene.roughness_metallic(hit.triangle, hit.barycentric);
         let unlit = scene.material(hit.triangle).unlit;
         let f0 = if unlit { Vec3::ZERO } else { Vec3::splat(DIELECTRIC_F0).lerp(color, metallic) };
-        // Mirrors that face each other need the same bound as white walls.
+        // The bound on albedos holds for mirrors too: light between two facing mirrors would not converge either.
         Layered::of(point.albedo, f0.min(Vec3::splat(world.albedo_max)), roughness, normal, view, unlit)
     }
 
@@ -214,7 +219,8 @@ mod tests {
         Bsdf::Gltf(Layered::of(Vec3::splat(albedo), Vec3::splat(f0), roughness, Vec3::Z, view, false))
     }
 
-    /// Share of even light that is reflected, and the mean weight of irradiance, which is π; each with its standard error.
+    /// Share of uniform incident light that is reflected, and the mean weight of irradiance samples, which should be π;
+    /// each with its standard error.
     fn sampled(bsdf: &Bsdf, blocks: u64) -> [(f64, f64); 2] {
         let mut moments = [Moments::default(); 2];
         for b in 0..blocks {
@@ -235,14 +241,14 @@ mod tests {
 
     #[test]
     fn surfaces_reflect_no_more_than_arrives() {
-        // Metalness between 0 and 1 of a white material, which reflects most of all.
+        // A white material reflects more than any other.
         for metallic in [0.0f32, 0.3, 0.7, 1.0] {
             for roughness in [0.0f32, 0.1, 0.3, 0.5, 0.7, 1.0] {
                 for cosine in [0.002, 0.02, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0] {
                     let f0 = 0.04 + 0.96 * metallic;
                     let [(albedo, error), _] = sampled(&layered(1.0 - metallic, f0, roughness, cosine), 2000);
-                    // An upper bound: four standard errors (3e-5 on this side) for 192 cases, and f32's rounding of half
-                    // vectors at α = 0.001.
+                    // The bound is 1, plus four standard errors (probability 3e-5) because 192 cases are tested, plus
+                    // f32's rounding of half vectors at α = 0.001.
                     let what = format!("metallic {metallic}, roughness {roughness}, cosine {cosine}");
                     assert!(albedo <= 1.0 + 4.0 * error + 1e-3, "{what}: {albedo} ± {error}");
                     assert!(error < 5e-3, "{what}: too uncertain to tell, ± {error}");

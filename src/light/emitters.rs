@@ -1,8 +1,10 @@
 //! Sampling of emissive triangles and of the sky.
 //!
-//! Triangles are chosen by power through an alias table, points on them uniformly by area; the sky by solid angle
-//! where it is constant, by texel power where it is a map. Both sides of a density — drawing a sample, and asking how
-//! dense samples are along a given ray — stand here together, for multiple importance sampling needs both.
+//! An alias table chooses triangles in proportion to their power. Points on a triangle are uniform by area. Directions
+//! of a constant sky are uniform by solid angle. Texels of a sky map are chosen in proportion to their power.
+//!
+//! Multiple importance sampling needs two functions: one draws a sample, the other gives the density of samples along a
+//! given ray. Both stand here together.
 
 use std::f32::consts::PI;
 
@@ -17,41 +19,44 @@ use crate::scene::{Environment, Scene, TriangleIndex};
 use crate::trace::Hit;
 use crate::trace::offset::{end_offset, ray_offset};
 
-/// Points per side of the grid on which a textured triangle's mean emission is estimated.
+/// The mean emission of a textured triangle is estimated on a grid of this many points per side.
 const POWER_GRID: usize = 4;
 
-/// Share of the material's full factor that is added to a triangle's estimated emission, so that a bright spot of the
-/// texture which the grid missed is still sampled now and then (the estimate steers noise, never the mean).
+/// Share of the material's full emission factor that is added to a triangle's estimated emission. The grid can miss a
+/// bright spot of the texture; with this addition such a triangle is still sampled. The estimate affects noise only,
+/// not the mean.
 const POWER_FLOOR: f32 = 0.01;
 
-/// Share of light samples that go to the sky when there are emissive triangles too ([`Emitters::draw`] spends a bit).
+/// Share of samples for the sky if there are emissive triangles too. [`Emitters::draw`] decides with one random bit, so
+/// this must be ½.
 const SKY_SHARE: f32 = 0.5;
 
-/// A direction from which light may arrive.
+/// A sampled direction towards an emitter.
 #[derive(Debug, Clone, Copy)]
 pub struct LightSample {
     /// Unit.
     pub direction: Vec3,
-    /// End of the shadow segment, `None` for the sky.
+    /// End of the shadow segment. `None` for the sky.
     pub target: Option<Vec3>,
-    /// Emitted radiance towards the point, times the emitter's own opacity, W·m⁻²·sr⁻¹.
+    /// Radiance emitted towards the point × the emitter's opacity, W·m⁻²·sr⁻¹.
     pub radiance: Vec3,
-    /// Of drawing this direction, sr⁻¹.
+    /// Density with which this direction is drawn, sr⁻¹.
     pub density: f32,
 }
 
-/// All that emits, ready for sampling.
+/// The emissive triangles and the sky, prepared for sampling.
 pub struct Emitters {
     triangles: Vec<EmissiveTriangle>,
-    /// Entry of `triangles` plus one of every scene triangle that emits, 0 for the others; empty if none emits.
+    /// Per triangle of the scene: 1 + its index in `triangles`, or 0 if it does not emit. Empty if no triangle emits.
     entry_of_triangle: Vec<u32>,
+    /// Draws an index of `triangles`. `None` if no triangle emits.
     alias: Option<AliasTable>,
     sky: Option<Sky>,
-    /// Box around all emissive triangles; empty (lower above upper) without any.
+    /// Box around all emissive triangles. Its lower corner lies above its upper corner if no triangle emits.
     bounds: (Vec3, Vec3),
 }
 
-/// What sampling needs of a triangle, together in memory.
+/// The data that sampling needs of a triangle, contiguous in memory.
 struct EmissiveTriangle {
     corner: Vec3,
     edges: [Vec3; 2],
@@ -60,7 +65,7 @@ struct EmissiveTriangle {
     /// Probability of the triangle ÷ its area, m⁻².
     density_per_area: f32,
     double_sided: bool,
-    /// Emitted radiance times opacity where no texture changes it, W·m⁻²·sr⁻¹.
+    /// Emitted radiance × opacity, W·m⁻²·sr⁻¹. `None` if a texture or vertex colours change it.
     constant_radiance: Option<Vec3>,
     index: TriangleIndex,
 }
@@ -90,41 +95,41 @@ impl EmissiveTriangle {
         self.corner + self.edges[0] * barycentric.x + self.edges[1] * barycentric.y
     }
 
-    /// Emitted radiance times opacity.
+    /// Emitted radiance × opacity, W·m⁻²·sr⁻¹.
     #[inline]
     fn radiance(&self, scene: &Scene, barycentric: Vec2) -> Vec3 {
         self.constant_radiance
             .unwrap_or_else(|| scene.emission(self.index, barycentric) * scene.opacity(self.index, barycentric))
     }
 
-    /// Where a shadow segment from `origin` to a point of the triangle ends: short of it, on the side that faces the
-    /// receiver, which the sign of `cosine` names.
+    /// End of the shadow segment from `origin` to a point of the triangle. It lies just off the triangle on the
+    /// receiver's side, which the sign of `cosine` gives.
     #[inline]
     fn shadow_target(&self, origin: Vec3, point: Vec3, cosine: f32) -> Vec3 {
         point + self.normal * self.ray_offset.max(end_offset(origin)).copysign(cosine)
     }
 }
 
-/// An emitter chosen and a place on it.
+/// A drawn emitter with a direction or a point on it.
 enum Drawn<'e> {
     Sky { direction: Vec3, density: f32 },
     Triangle { triangle: &'e EmissiveTriangle, barycentric: Vec2 },
 }
 
-/// Where irradiance is asked for.
+/// The point at which irradiance is estimated.
 #[derive(Debug, Clone, Copy)]
 pub struct Receiver {
     pub position: Vec3,
-    /// Unit; that of shading.
+    /// Unit shading normal.
     pub normal: Vec3,
-    /// Unit; nothing arrives from below.
+    /// Unit geometric normal. No light arrives from the side behind it.
     pub geometric_normal: Vec3,
 }
 
-/// Irradiance that arrives unless something is in between.
+/// The irradiance of a sample if nothing occludes it.
 #[derive(Debug, Clone, Copy)]
 pub struct IrradianceSample {
-    /// End of the shadow segment, or unit direction of the sky.
+    /// `Ok` with the end of the shadow segment, or `Err` with the unit direction of a sky sample.
     pub target: Result<Vec3, Vec3>,
     /// W·m⁻².
     pub irradiance: Vec3,
@@ -159,7 +164,7 @@ impl Emitters {
         let corners = || triangles.iter().flat_map(|t| [t.corner, t.corner + t.edges[0], t.corner + t.edges[1]]);
         let bounds = (corners().fold(Vec3::INFINITY, Vec3::min), corners().fold(Vec3::NEG_INFINITY, Vec3::max));
         let weights: Vec<f64> = powers.into_iter().map(|p| p.1).collect();
-        // `None` only without positive weights: then there is nothing to sample.
+        // `None` only if no weight is positive. There is nothing to sample then.
         let alias = AliasTable::new(&weights);
         Emitters { triangles, entry_of_triangle, alias, sky: Sky::new(&scene.environment), bounds }
     }
@@ -177,16 +182,16 @@ impl Emitters {
         self.sky.is_some()
     }
 
-    /// Whether every emitter lies behind the plane through `point` with this normal, so that sampling is in vain.
+    /// Whether every emitter lies behind the plane through `point` with this normal. No sample can then bring light.
     pub fn all_behind(&self, point: Vec3, normal: Vec3) -> bool {
         let (low, high) = self.bounds;
         let foremost = Vec3::select(normal.cmpge(Vec3::ZERO), high, low);
-        // Not a number where there are no triangles: nothing is in front then.
+        // Without triangles the left side is NaN, so the comparison is false.
         let any_in_front = (foremost - point).dot(normal) > 0.0;
         self.sky.is_none() && !any_in_front
     }
 
-    /// Whether the only emitter is a sky of one radiance: then cosine-distributed rays are the best samples there are.
+    /// Whether the only emitter is a sky of constant radiance. Cosine-distributed rays are then the best samples.
     pub fn is_uniform_sky(&self) -> bool {
         self.alias.is_none() && matches!(self.sky, Some(Sky::Uniform))
     }
@@ -199,7 +204,7 @@ impl Emitters {
         }
     }
 
-    /// The emitter that uniform random bits choose, and a place on it.
+    /// Turns uniform random bits into an emitter with a direction or a point on it.
     #[inline]
     fn draw(&self, scene: &Scene, bits: [u32; 4]) -> Option<Drawn<'_>> {
         let [mut choice, word, u, v] = bits;
@@ -208,7 +213,8 @@ impl Emitters {
             (None, None) => return None,
             (Some(_), None) => {}
             (alias, Some(sky)) => {
-                // With triangles beside it the top bit decides, and the other bits serve on.
+                // If there are triangles too, the top bit chooses between sky and triangles. The other bits are used
+                // below.
                 if alias.is_none() || choice >> 31 == 0 {
                     choice <<= u32::from(alias.is_some());
                     let (direction, density) = sky.sample(&scene.environment, [choice, word], place);
@@ -221,7 +227,7 @@ impl Emitters {
         Some(Drawn::Triangle { triangle, barycentric: triangle_barycentric(place) })
     }
 
-    /// A direction from `point` towards an emitter, drawn by uniform random bits; `None` where the emitter cannot light
+    /// Turns uniform random bits into a direction from `point` towards an emitter. `None` if the emitter cannot light
     /// the point.
     pub fn sample(&self, scene: &Scene, point: Vec3, bits: [u32; 4]) -> Option<LightSample> {
         let (triangle, barycentric) = match self.draw(scene, bits)? {
@@ -239,7 +245,7 @@ impl Emitters {
         if cosine <= 0.0 && !triangle.double_sided {
             return None;
         }
-        // Not finite where the point lies on the emitter or in its plane.
+        // The density is not finite if the point lies on the emitter or in its plane.
         let density = triangle.density_per_area * (1.0 - self.sky_share()) * distance_squared / cosine.abs();
         if !density.is_finite() {
             return None;
@@ -248,13 +254,13 @@ impl Emitters {
         Some(LightSample { direction, target: Some(target), radiance: triangle.radiance(scene, barycentric), density })
     }
 
-    /// As [`Self::sample`], for a Lambertian receiver of irradiance and the balance heuristic against
-    /// `n_cosine` cosine-distributed rays beside `n_light` light samples: what this sample adds to the irradiance if it
-    /// is not shadowed, W·m⁻².
+    /// Like [`Self::sample`], but returns what the sample adds to the irradiance, W·m⁻², if nothing occludes it. The
+    /// weight is that of the balance heuristic for `n_light` such samples and `n_cosine` cosine-distributed rays.
     ///
-    /// With c = n·(y − x) and c' = n_y·(x − y), d the distance: the cosines are c/d and c'/d, the densities of the two
-    /// techniques c/(πd) and p_A·d³/c', so that L·(c/d) ÷ (n_c·c/(πd) + n_l·p_A·d³/c') = L·c·c' ÷ (n_c·c·c'/π +
-    /// n_l·p_A·d⁴): one division and no root.
+    /// The formula needs one division and no root. Let x be the receiver, y the point on the emitter, d their distance,
+    /// c = n·(y − x) and c' = n_y·(x − y). The cosines are c/d and c'/d. The densities of the two techniques are c/(πd)
+    /// and p_A·d³/c', with the density by area p_A. So the result is L·(c/d) ÷ (n_c·c/(πd) + n_l·p_A·d³/c') = L·c·c' ÷
+    /// (n_c·c·c'/π + n_l·p_A·d⁴).
     #[inline]
     pub fn irradiance_sample(
         &self,
@@ -281,7 +287,7 @@ impl Emitters {
                 let c_geometric = receiver.geometric_normal.dot(to_target);
                 let towards = -triangle.normal.dot(to_target);
                 let c_emitter = if triangle.double_sided { towards.abs() } else { towards };
-                // All three at once: which of them fails cannot be predicted.
+                // One test for all three, because the processor cannot predict which of them fails.
                 if c.min(c_geometric).min(c_emitter) <= 0.0 {
                     return None;
                 }
@@ -290,7 +296,7 @@ impl Emitters {
                 let product = c * c_emitter;
                 let share = product / (n_cosine * (1.0 / PI) * product + n_light * (per_area * d2) * d2);
                 let radiance = triangle.radiance(scene, barycentric);
-                // Not finite where the receiver lies on the emitter.
+                // The share is not finite if the receiver lies on the emitter.
                 (share.is_finite() && radiance != Vec3::ZERO).then(|| IrradianceSample {
                     target: Ok(triangle.shadow_target(receiver.position, on_triangle, towards)),
                     irradiance: radiance * share,
@@ -299,7 +305,7 @@ impl Emitters {
         }
     }
 
-    /// Density with which [`Self::sample`] would have drawn this hit along unit `direction` from `point`, sr⁻¹.
+    /// Density, sr⁻¹, with which [`Self::sample`] draws the unit `direction` from `point` to this hit.
     pub fn density_of_hit(&self, point: Vec3, direction: Vec3, hit: &Hit) -> f32 {
         let Some(&entry @ 1..) = self.entry_of_triangle.get(hit.triangle.0 as usize) else { return 0.0 };
         let triangle = &self.triangles[entry as usize - 1];
@@ -308,7 +314,7 @@ impl Emitters {
         triangle.density_per_area * (1.0 - self.sky_share()) * distance_squared / cosine
     }
 
-    /// Density with which [`Self::sample`] would have drawn the sky along unit `direction`, sr⁻¹.
+    /// Density, sr⁻¹, with which [`Self::sample`] draws the sky in the unit `direction`.
     pub fn density_of_sky(&self, scene: &Scene, direction: Vec3) -> f32 {
         self.sky.as_ref().map_or(0.0, |sky| sky.density(&scene.environment, direction)) * self.sky_share()
     }
@@ -333,13 +339,13 @@ impl Sky {
         }
     }
 
-    /// Direction and density by uniform random bits and a uniform place in the unit square.
+    /// Turns uniform random bits and a uniform point of the unit square into a direction, and gives its density.
     fn sample(&self, environment: &Environment, bits: [u32; 2], place: Vec2) -> (Vec3, f32) {
         match (self, environment) {
             (Sky::Map { alias, density }, Environment::Map(map)) => {
                 let texel = alias.draw(bits);
                 let (x, y) = ((texel % map.width) as f32, (texel / map.width) as f32);
-                // Uniform in solid angle within the texel: uniform in the cosine of the polar angle.
+                // Uniform by solid angle within the texel, which means uniform in the cosine of the polar angle.
                 let cos_of = |row: f32| (row / map.height as f32 * PI).cos();
                 let cosine = cos_of(y) + (cos_of(y + 1.0) - cos_of(y)) * place.y;
                 let u = (x + place.x) / map.width as f32;
@@ -363,7 +369,7 @@ fn texel_solid_angle(map: &EnvironmentMap, row: usize) -> f32 {
     ((edge(row) - edge(row + 1)) * 2.0 * std::f64::consts::PI / map.width as f64) as f32
 }
 
-/// Luminous power of a triangle up to a common factor: area × mean emission × sides.
+/// Luminous power of a triangle up to a factor common to all: area × mean emission × number of emitting sides.
 fn estimated_power(scene: &Scene, triangle: TriangleIndex) -> f32 {
     let material = scene.material(triangle);
     let full = if material.unlit { material.base_color.truncate() } else { material.emission };

@@ -1,4 +1,5 @@
-//! Light: what a surface sends out and what arrives at it. Bake, render and reference use these and no others.
+//! Light: the radiance that surfaces emit and reflect, and the irradiance that arrives at them. `bake`, `render` and
+//! `reference` all use these functions.
 
 pub mod bsdf;
 pub mod emitters;
@@ -14,15 +15,15 @@ use crate::trace::{TraceError, Tracer};
 use emitters::Emitters;
 use surface::SurfaceTable;
 
-/// What one needs to ask about light in a scene: the scene itself, rays, and the means to sample its emitters.
+/// A scene with all that light computations need: rays, shading data, and sampling of its emitters.
 pub struct World<'s> {
     pub scene: &'s Scene,
     pub tracer: Tracer<'s>,
     pub emitters: Emitters,
     pub surfaces: SurfaceTable,
-    /// Factor on all punctual lights (some exporters multiply them by 683 and emission not).
+    /// Factor on all punctual lights. Some exporters multiply punctual lights by 683 but not emission; this undoes it.
     pub punctual_scale: f32,
-    /// Largest albedo allowed per channel; larger ones are clamped to it, so that bounces converge.
+    /// Largest albedo per channel. Larger albedos are clamped to it, so that the sum over bounces converges.
     pub albedo_max: f32,
 }
 
@@ -39,14 +40,14 @@ impl<'s> World<'s> {
         })
     }
 
-    /// Materials whose albedo can exceed [`World::albedo_max`] by their factors.
+    /// Number of materials whose factors allow an albedo above [`World::albedo_max`].
     pub fn clamped_materials(&self) -> u64 {
         let exceeds =
             |m: &&Material| !m.unlit && (m.base_color.truncate() * (1.0 - m.metallic)).max_element() > self.albedo_max;
         self.scene.materials.iter().filter(exceeds).count() as u64
     }
 
-    /// Whether anything but punctual lights sends out light.
+    /// Whether there is light from emissive surfaces or the sky.
     pub fn has_emitters(&self) -> bool {
         !self.emitters.is_empty()
     }

@@ -1,11 +1,11 @@
-//! The reference's estimators: unidirectional paths, with next-event estimation at every vertex.
+//! Path tracing for the reference: unidirectional paths with next-event estimation at every vertex.
 //!
-//! At each vertex one shadow ray goes towards an emitter (emissive triangles by power, the sky), one towards a punctual
-//! light, and one ray along the BRDF finds the next vertex. Emission found by both the first and the last is weighted
-//! by multiple importance sampling (Veach & Guibas 1995), so each path counts once. Punctual lights cannot be hit, so
-//! theirs needs no weight.
+//! Each vertex sends three rays: a shadow ray towards an emitter (an emissive triangle or the sky), a shadow ray
+//! towards a punctual light, and a ray along the BRDF that finds the next vertex. The first and the third find the same
+//! emission. Multiple importance sampling (Veach & Guibas 1995) weights them, so that each path counts once. No ray can
+//! hit a punctual light, so the second needs no weight.
 //!
-//! Surfaces, emission and what lies below the horizon are as everywhere else: [`super::surface`], [`super::sampled`].
+//! Surfaces and emission follow [`super::surface`] and [`super::sampled`], as in the bake.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -20,47 +20,48 @@ use crate::math::color::luminance;
 use crate::math::random::Numbers;
 use crate::trace::Ray;
 
-/// How emission is found. All have the same mean.
+/// The technique that finds emission. All of them give the same mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Strategy {
-    /// By both techniques, weighted by the power heuristic (Veach & Guibas 1995, exponent 2).
+    /// Both techniques, weighted by the power heuristic (Veach & Guibas 1995, exponent 2).
     #[default]
     Mis,
-    /// Only by the rays that continue paths.
+    /// Only the rays that continue paths.
     BsdfOnly,
-    /// Only by rays towards emitters (but for emission that these can never find).
+    /// Only rays towards emitters. Emission that these can never sample is found by the rays that continue paths.
     LightOnly,
 }
 
-/// What a path is.
+/// Settings of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PathSettings {
     pub transport: Transport,
     pub strategy: Strategy,
-    /// Most reflections between a light and the surface at which it arrives; `None` for all. 0 leaves what arrives
-    /// straight from emitters, 1 adds the first bounce, that of punctual lights included.
+    /// Most bounces, where bounces are the reflections between a light and the surface in the picture. `None` allows
+    /// any number. 0 keeps only the light that arrives directly from emissive surfaces and the sky. 1 adds light that
+    /// one other surface has reflected, including light of punctual lights.
     pub max_bounces: Option<u32>,
-    /// Largest irradiance, W·m⁻² in any channel, that one sample may bring: larger ones are scaled down to it. It hides
-    /// rare bright samples at the price of a result that is too dark; `None` for the truth.
+    /// Largest irradiance of one sample in any channel, W·m⁻². Larger samples are scaled down to it. This hides rare
+    /// bright samples but makes the result too dark. `None` keeps all samples, so the result is unbiased.
     pub firefly_clamp: Option<f32>,
 }
 
-/// One sample of the light that arrives at a surface point: all but punctual lights' own.
+/// One sample of the light that arrives at a surface point, without the direct light of punctual lights.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Gathered {
     /// W·m⁻².
     pub irradiance: Vec3,
-    /// Of it the radiance reflected towards the viewer, W·m⁻²·sr⁻¹.
+    /// Radiance that the surface reflects from this light towards the viewer, W·m⁻²·sr⁻¹.
     pub radiance: Vec3,
     /// The glossy part of `radiance`.
     pub glossy: Vec3,
 }
 
-/// Reflections before Russian roulette begins: these carry most of the light, and paths are not worth ending there.
+/// Russian roulette starts at this bounce. Earlier bounces carry most of the light, so ending paths there does not pay.
 const ROULETTE_FROM: u32 = 3;
 
-/// Pairs of dimensions of [`BlockSample`] that belong to a vertex, and what each is for.
+/// Number of pairs of dimensions of [`BlockSample`] that belong to a vertex. The constants below assign them.
 const PAIRS_PER_VERTEX: u32 = 8;
 const PAIR_SCATTER: u32 = 0;
 const PAIR_ROULETTE: u32 = 2;
@@ -68,7 +69,8 @@ const PAIR_PUNCTUAL: u32 = 3;
 const PAIR_EMITTER: u32 = 4;
 
 impl World<'_> {
-    /// One sample of the indirect light at `point`, seen from unit `view`, with `normal` for shading.
+    /// One sample of the light at `point` as [`Gathered`] defines it. `view` is the unit direction towards the viewer,
+    /// and `normal` the shading normal.
     pub fn gather(
         &self,
         point: &SurfacePoint,
@@ -107,8 +109,8 @@ impl World<'_> {
         }
     }
 
-    /// One sample of the radiance that arrives at `origin` along `step`: of emission the part that this technique
-    /// answers for, and all that is reflected.
+    /// One sample of the radiance that arrives at `origin` along `step`: the reflected light, and the emission with the
+    /// weight of this technique.
     fn incoming(
         &self,
         origin: Vec3,
@@ -155,8 +157,8 @@ impl World<'_> {
             let Some(next) = Step::sample(&point, &bsdf, numbers) else { return sum };
             throughput *= bsdf.scattered(next.direction, next.cosine).total() * next.density.recip();
             if bounce >= ROULETTE_FROM {
-                // Paths survive in proportion to what they carry: those that do carry the same afterwards, so the
-                // spread of their weights stays bounded however close albedos are to 1.
+                // A path survives with a probability equal to its throughput, and the throughput of a survivor is
+                // raised to 1 (in the largest channel). So throughputs stay similar, even if albedos are close to 1.
                 let survival = throughput.max_element().min(1.0);
                 numbers.seek(bounce * PAIRS_PER_VERTEX + PAIR_ROULETTE);
                 let survives = numbers.uniform() < survival;
@@ -170,7 +172,8 @@ impl World<'_> {
         }
     }
 
-    /// Emission found by sampling emitters from a vertex: direction, its cosine, and radiance ÷ density × weight.
+    /// Emission found by sampling an emitter from a vertex: its direction, the cosine of the direction to the normal,
+    /// and radiance × weight ÷ density.
     #[inline]
     fn emitter_sample(
         &self,
@@ -206,8 +209,8 @@ impl World<'_> {
         Some((sample.direction, cosine, sample.radiance * (weight / sample.density)))
     }
 
-    /// Radiance reflected at a vertex from punctual lights: one of them, chosen in proportion to what it would bring if
-    /// nothing were in between.
+    /// An estimate of the radiance that a vertex reflects from all punctual lights. It tests one light, which is chosen
+    /// in proportion to the luminance that it would add without occluders.
     #[inline]
     fn punctual_sample(
         &self,
@@ -223,7 +226,8 @@ impl World<'_> {
         }
         numbers.seek(vertex * PAIRS_PER_VERTEX + PAIR_PUNCTUAL);
         let mut number = numbers.uniform();
-        // Reservoir sampling with one number: what is left of it after each decision is uniform again.
+        // Reservoir sampling with a single random number. After each decision the number is rescaled and is uniform
+        // again.
         let mut total = 0.0;
         let mut chosen: Option<(Incident, Vec3, f32)> = None;
         for light in lights {
@@ -258,14 +262,15 @@ impl World<'_> {
 #[derive(Debug, Clone, Copy)]
 struct Step {
     direction: Vec3,
-    /// To the shading normal.
+    /// Cosine between direction and shading normal.
     cosine: f32,
-    /// Of having drawn this direction, sr⁻¹.
+    /// Density with which this direction was drawn, sr⁻¹.
     density: f32,
 }
 
 impl Step {
-    /// `None` below the shading or the geometric horizon: nothing arrives from there.
+    /// Samples the BSDF. `None` if the direction lies below the shading or the geometric horizon, because no light
+    /// arrives from there.
     #[inline]
     fn sample(point: &SurfacePoint, bsdf: &Bsdf, numbers: &mut BlockSample) -> Option<Step> {
         let direction = bsdf.sample(numbers);
@@ -279,12 +284,13 @@ impl Step {
 }
 
 impl Strategy {
-    /// Weight of emission that a path's ray has met, given the densities of the ray and of sampling the same emission.
+    /// Weight of emission that a path's ray has hit. `density` is that of the ray; `light_density` is that of drawing
+    /// the same direction by sampling emitters.
     #[inline]
     fn weight_of_hit(self, density: f32, light_density: f32) -> f32 {
         match self {
             Strategy::BsdfOnly => 1.0,
-            // What light sampling never draws must be counted here.
+            // Sampling emitters never draws this emission, so it counts fully here.
             _ if light_density <= 0.0 => 1.0,
             Strategy::LightOnly => 0.0,
             Strategy::Mis => power_heuristic(density, light_density),
@@ -292,7 +298,7 @@ impl Strategy {
     }
 }
 
-/// Weight of a technique of density `this` beside one of density `other`, both in sr⁻¹.
+/// Weight of a technique of density `this` that is combined with one of density `other`, both in sr⁻¹.
 #[inline]
 fn power_heuristic(this: f32, other: f32) -> f32 {
     let ratio = other / this;

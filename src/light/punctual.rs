@@ -1,4 +1,4 @@
-//! Direct light from punctual lights, as `KHR_lights_punctual` defines them.
+//! Direct light from punctual lights as defined by `KHR_lights_punctual`.
 
 use glam::Vec3;
 
@@ -8,21 +8,23 @@ use super::surface::SurfacePoint;
 use crate::scene::{LightKind, PunctualLight};
 use crate::trace::Ray;
 
-/// Smallest difference of the cone cosines; from the extension's own formula, keeps equal cones finite.
+/// Least difference of the cosines of inner and outer cone, from the formula of the extension. It avoids a division by
+/// zero for equal cones.
 const MIN_CONE_WIDTH: f32 = 0.001;
 
-/// What arrives at a point from one light when nothing is in between.
+/// The light that arrives at a point from one punctual light without occluders.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Incident {
     /// Unit, towards the light.
     pub direction: Vec3,
-    /// Metres; infinite for directional lights.
+    /// Distance to the light, metres. Infinite for directional lights.
     pub distance: f32,
-    /// On a surface that faces the light, W·m⁻².
+    /// Irradiance on a surface that faces the light, W·m⁻².
     pub irradiance: Vec3,
 }
 
-/// `None` where the light does not reach: out of range, outside the cone, or at the light itself.
+/// The light that arrives at `position` from one punctual light. `None` if the position is out of range, outside the
+/// cone, or at the light itself.
 pub fn incident(light: &PunctualLight, position: Vec3) -> Option<Incident> {
     let from = |light_position: Vec3, range_m: f32| {
         let to_light = light_position - position;
@@ -52,19 +54,19 @@ pub fn incident(light: &PunctualLight, position: Vec3) -> Option<Incident> {
 }
 
 impl World<'_> {
-    /// Irradiance from all punctual lights at a surface with this shading normal, shadowed, W·m⁻²; and the number of
-    /// shadow rays that it took.
+    /// Irradiance with shadows from all punctual lights, W·m⁻², at a surface with this shading normal; and the number
+    /// of shadow rays.
     pub fn punctual_irradiance(&self, point: &SurfacePoint, normal: Vec3, salt: u32) -> (Vec3, u32) {
         self.punctual_sum(point, normal, salt, |_, cosine| Vec3::splat(cosine))
     }
 
-    /// Radiance that a surface reflects of all punctual lights, shadowed, W·m⁻²·sr⁻¹.
+    /// Radiance that a surface reflects from all punctual lights, with shadows, W·m⁻²·sr⁻¹.
     pub fn punctual_radiance(&self, point: &SurfacePoint, bsdf: &Bsdf, salt: u32) -> Vec3 {
         self.punctual_sum(point, bsdf.normal(), salt, |direction, cosine| bsdf.scattered(direction, cosine).total()).0
     }
 
-    /// Sum over lights that are not in shadow of their irradiance × `response` (direction to the light, its cosine), and
-    /// the number of shadow rays.
+    /// The sum of irradiance × `response` over the lights that no surface occludes, and the number of shadow rays.
+    /// `response` takes the direction to the light and its cosine to the normal.
     #[inline]
     fn punctual_sum(
         &self,
@@ -79,7 +81,7 @@ impl World<'_> {
         for light in &self.scene.lights {
             let Some(incident) = incident(light, point.position) else { continue };
             let cosine = normal.dot(incident.direction);
-            // Light from below the surface itself cannot arrive, whatever the shading normal says.
+            // Light from below the surface cannot arrive, even if the shading normal faces it.
             if cosine <= 0.0 || point.geometric_normal.dot(incident.direction) <= 0.0 {
                 continue;
             }

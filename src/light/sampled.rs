@@ -1,38 +1,43 @@
-//! Irradiance from emissive surfaces and the sky, found by sampling: at surfaces (next-event estimation and cosine
-//! rays combined) and the parts that a probe's own capture needs.
+//! Irradiance from emissive surfaces and the sky, by sampling.
 //!
-//! The two techniques are combined by the balance heuristic (Veach & Guibas 1995). How the samples are divided between
-//! them follows [`Allocation`]: unbiased for any division.
+//! Two techniques find this light: rays towards sampled emitters, and cosine-distributed rays. The balance heuristic
+//! (Veach & Guibas 1995) combines them. [`Allocation`] divides the samples between them; the estimate is unbiased for
+//! any division.
 
 use glam::{Vec2, Vec3};
 
 use super::World;
 use super::emitters::{LightSample, Receiver};
 use super::surface::SurfacePoint;
-use crate::math::random::{Random, Spread};
+use crate::math::random::{KroneckerSequence, Random};
 use crate::math::sampling::{cosine_hemisphere, cosine_hemisphere_density};
 use crate::trace::Ray;
 
-/// How many samples go along cosine-distributed rays and how many towards emitters.
+/// The division of samples between the two techniques.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Allocation {
+    /// Number of cosine-distributed rays.
     pub cosine: u32,
+    /// Number of rays towards sampled emitters.
     pub light: u32,
 }
 
 impl Allocation {
-    /// Divides `samples` by `coverage`, the share of all directions in which an emitter is seen: light samples find
-    /// what is small, cosine rays what is large, and where all directions emit these alone have no noise at all.
+    /// Divides `samples` by `coverage`, the share of all directions in which an emitter is visible. Rays towards
+    /// emitters suit small emitters, and cosine-distributed rays suit large ones. If one radiance arrives from all
+    /// directions, the latter alone have no noise.
     pub fn by_coverage(samples: u32, coverage: f32) -> Allocation {
         let cosine = ((samples as f32 * coverage).round() as u32).clamp(1, samples.max(1));
         Allocation { cosine, light: samples.max(1) - cosine }
     }
 }
 
-/// Rays spent.
+/// Numbers of rays traced.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct RayCount {
+    /// Rays that find the next surface.
     pub primary: u64,
+    /// Rays that test whether light arrives.
     pub shadow: u64,
 }
 
@@ -68,7 +73,7 @@ impl World<'_> {
         let counts = [allocation.cosine as f32, allocation.light as f32];
         let mut sum = Vec3::ZERO;
         for i in 0..allocation.cosine {
-            // Stratified along one axis; the other is free.
+            // Stratified along the first axis only.
             let u = Vec2::new((i as f32 + random.uniform()) / counts[0], random.uniform());
             let direction = cosine_hemisphere(normal, u);
             let cosine = normal.dot(direction);
@@ -82,7 +87,7 @@ impl World<'_> {
                 sum += radiance * (cosine / density);
             }
         }
-        for bits in Spread::new(random).take(allocation.light as usize) {
+        for bits in KroneckerSequence::new(random).take(allocation.light as usize) {
             if let Some(sample) = self.emitters.irradiance_sample(self.scene, &receiver, counts, bits) {
                 rays.shadow += 1;
                 let ray = match sample.target {
@@ -97,15 +102,15 @@ impl World<'_> {
         sum
     }
 
-    /// Radiance emitted towards the ray's origin by what the ray meets first, and the density of finding it by light
-    /// sampling. The ray's direction has unit length.
+    /// Radiance that the ray's first hit, or the sky, emits towards the ray's origin; and the density, sr⁻¹, with which
+    /// sampling of emitters draws the same direction. The ray's direction has unit length.
     fn emitted_along(&self, ray: Ray) -> (Vec3, f32) {
         let sky = || {
             let radiance = self.scene.environment.radiance(ray.direction);
             (radiance, self.emitters.density_of_sky(self.scene, ray.direction))
         };
         if self.emitters.triangle_count() == 0 {
-            // Whatever stops the ray is dark: any hit will do.
+            // No surface emits, so any hit means no light.
             return if self.tracer.occluded(ray) { (Vec3::ZERO, 0.0) } else { sky() };
         }
         let Some(hit) = self.tracer.closest(ray) else { return sky() };
@@ -114,5 +119,25 @@ impl World<'_> {
             return (radiance, 0.0);
         }
         (radiance, self.emitters.density_of_hit(ray.origin, ray.direction, &hit))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn allocations_keep_the_number_of_samples() {
+        for samples in [1, 2, 7, 64] {
+            for coverage in [0.0, 0.01, 0.3, 1.0] {
+                let Allocation { cosine, light } = Allocation::by_coverage(samples, coverage);
+                assert_eq!(cosine + light, samples);
+                // At least one cosine-distributed ray finds what sampling emitters cannot.
+                assert!(cosine >= 1);
+            }
+            assert_eq!(Allocation::by_coverage(samples, 1.0).light, 0);
+        }
+        assert_eq!(Allocation::by_coverage(64, 0.25), Allocation { cosine: 16, light: 48 });
+        assert_eq!(Allocation::by_coverage(0, 0.5), Allocation { cosine: 1, light: 0 });
     }
 }

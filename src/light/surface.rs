@@ -1,4 +1,4 @@
-//! A point on a surface, as the ray sees it that found it.
+//! Points on surfaces: all that shading needs at the hit of a ray.
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -8,28 +8,28 @@ use crate::scene::{Scene, TriangleIndex};
 use crate::trace::offset::ray_offset;
 use crate::trace::{Hit, Ray};
 
-/// Everything that shading at a hit needs. Normals are turned towards the ray's origin.
+/// All data that shading at a hit needs. Normals lie on the side of the ray's origin, which is the viewer's side.
 #[derive(Debug, Clone, Copy)]
 pub struct SurfacePoint {
     pub position: Vec3,
-    /// Unit, towards the viewer.
+    /// Unit, on the viewer's side.
     pub geometric_normal: Vec3,
     /// Unit, interpolated from the vertices, on the same side as the geometric normal.
     pub shading_normal: Vec3,
-    /// Whether the ray met the front.
+    /// Whether the ray hit the front.
     pub front: bool,
     pub double_sided: bool,
     /// Diffuse albedo, at most [`World::albedo_max`].
     pub albedo: Vec3,
-    /// Radiance that this side emits, W·m⁻²·sr⁻¹.
+    /// Radiance that the viewer's side emits, W·m⁻²·sr⁻¹.
     pub emission: Vec3,
-    /// Rays leave from this far off the surface, metres.
+    /// Distance from the surface at which rays that leave it start, metres.
     pub ray_offset: f32,
     pub hit: Hit,
 }
 
 impl SurfacePoint {
-    /// A point of no surface, which gathers light from the side of unit `normal` as a white one would.
+    /// A point in free space. It receives light like a point of a white surface with unit normal `normal`.
     pub fn in_space(position: Vec3, normal: Vec3) -> SurfacePoint {
         SurfacePoint {
             position,
@@ -44,28 +44,29 @@ impl SurfacePoint {
         }
     }
 
-    /// Where rays that leave on the viewer's side start.
+    /// Start of rays that leave the surface on the viewer's side.
     pub fn ray_origin(&self) -> Vec3 {
         self.position + self.geometric_normal * self.ray_offset
     }
 
-    /// Whether the ray met the back of a surface that has one: a sign of being inside geometry.
+    /// Whether the ray hit the back of a surface that is not double-sided. Such a hit suggests that the ray's origin
+    /// lies inside geometry.
     pub fn is_back(&self) -> bool {
         !self.front && !self.double_sided
     }
 }
 
-/// What shading needs of a triangle, in one cache line: hits are scattered over the scene, and fetching their vertices
-/// one by one took as long as Embree took to find them.
+/// The shading data of a triangle in one cache line. Hits are scattered over the scene, and reading each vertex from
+/// its own place took as long as Embree's search for the hit.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
 struct TriangleRecord {
     corner: Vec3,
     edges: [Vec3; 2],
-    /// Of the front, unit.
+    /// Unit normal of the front.
     normal: Vec3,
     ray_offset: f32,
-    /// Whether vertex normals differ from the geometric one.
+    /// Whether the vertex normals differ from the geometric normal.
     smooth: bool,
     emits: bool,
     double_sided: bool,
@@ -73,7 +74,7 @@ struct TriangleRecord {
     material: u32,
 }
 
-/// What is the same all over a material; `None` where a texture or vertex colours decide.
+/// Properties that are constant over a material. `None` if a texture or vertex colours change them.
 #[derive(Debug, Clone, Copy)]
 struct MaterialConstants {
     albedo: Option<Vec3>,
@@ -87,7 +88,8 @@ pub struct SurfaceTable {
     constants: Vec<MaterialConstants>,
 }
 
-/// Vertex normals within this angle (radians) of the geometric normal are those of a flat triangle: f32 rounding.
+/// A triangle is flat if its vertex normals are within this angle (radians) of the geometric normal. The angle allows
+/// for f32 rounding.
 const FLAT_ANGLE: f32 = 1e-5;
 
 impl SurfaceTable {
@@ -129,13 +131,13 @@ impl SurfaceTable {
 }
 
 impl World<'_> {
-    /// The surface that `ray` meets.
+    /// The surface that `ray` hits first.
     #[inline]
     pub fn surface(&self, ray: Ray) -> Option<SurfacePoint> {
         self.tracer.closest(ray).map(|hit| self.surface_at(hit, ray.direction))
     }
 
-    /// The surface of a hit found along `direction`.
+    /// The surface at a hit of a ray along `direction`.
     #[inline]
     pub fn surface_at(&self, hit: Hit, direction: Vec3) -> SurfacePoint {
         let record = &self.surfaces.triangles[hit.triangle.0 as usize];
@@ -162,7 +164,7 @@ impl World<'_> {
         }
     }
 
-    /// Radiance that the front (or back) of a surface emits at a hit, W·m⁻²·sr⁻¹.
+    /// Radiance that the front (`front`) or back of a surface emits at a hit, W·m⁻²·sr⁻¹.
     #[inline]
     fn emission_at(&self, hit: &Hit, front: bool) -> Vec3 {
         let record = &self.surfaces.triangles[hit.triangle.0 as usize];
@@ -175,7 +177,7 @@ impl World<'_> {
         }
     }
 
-    /// Radiance that a hit emits against `direction`, W·m⁻²·sr⁻¹.
+    /// Radiance that a hit of a ray along `direction` emits towards the ray's origin, W·m⁻²·sr⁻¹.
     #[inline]
     pub fn emission_towards(&self, hit: &Hit, direction: Vec3) -> Vec3 {
         let record = &self.surfaces.triangles[hit.triangle.0 as usize];
@@ -186,7 +188,7 @@ impl World<'_> {
     }
 }
 
-/// The interpolated vertex normal on the viewer's side, the geometric one where there is none.
+/// The interpolated vertex normal on the viewer's side, or the geometric normal if the vertices have none.
 fn shading_normal(scene: &Scene, hit: &Hit, geometric_normal: Vec3) -> Vec3 {
     let normal = scene.mesh.interpolate(&scene.mesh.normals, hit.triangle, hit.barycentric);
     let normal = normal.normalize_or(geometric_normal);

@@ -1,7 +1,8 @@
 //! Drawing an index by weight in constant time.
 //!
 //! Source: Vose, *A Linear Algorithm for Generating Random Numbers with a Given Distribution*, 1991. The capture draws
-//! one emitter per shadow ray, so a draw must cost little against a ray: one 64-bit word and one entry of 8 bytes.
+//! one emitter per shadow ray, so a draw must cost far less than a ray. It takes 64 random bits and reads one entry of
+//! 8 bytes.
 
 /// A discrete distribution.
 #[derive(Debug, Clone)]
@@ -11,24 +12,24 @@ pub struct AliasTable {
 
 #[derive(Debug, Clone, Copy)]
 struct Entry {
-    /// Share of this entry's column that is its own, as a threshold of 32 random bits.
+    /// Probability of the entry's own index, × 2³²: a 32-bit random word below this draws it.
     own: u32,
-    /// Who has the rest.
+    /// The index that all other words draw.
     alias: u32,
 }
 
 impl AliasTable {
-    /// `None` unless all weights are finite and not negative, some is positive, and a `u32` can count them.
+    /// `None` if a weight is negative or not finite, if all are 0, or if there are more than a `u32` can count.
     pub fn new(weights: &[f64]) -> Option<AliasTable> {
         let n = u32::try_from(weights.len()).ok()?;
         let total: f64 = weights.iter().sum();
         if !(total > 0.0 && total.is_finite()) || weights.iter().any(|w| *w < 0.0) {
             return None;
         }
-        // Heights of the columns in units of the mean; those below 1 are filled up from those above.
+        // Heights of the columns in units of the mean. Columns above 1 give to those below 1 until all are full.
         let mut height: Vec<f64> = weights.iter().map(|w| w / total * f64::from(n)).collect();
         let (mut low, mut high): (Vec<u32>, Vec<u32>) = (0..n).partition(|&i| height[i as usize] < 1.0);
-        // Columns left over when the other list has run out are full, to rounding.
+        // Columns that remain when one of the lists is empty have the height 1 up to rounding.
         let mut entries: Vec<Entry> = (0..n).map(|i| Entry { own: u32::MAX, alias: i }).collect();
         while let (Some(&donor), Some(receiver)) = (high.last(), low.pop()) {
             let share = height[receiver as usize];
@@ -39,7 +40,7 @@ impl AliasTable {
                 low.push(donor);
             }
         }
-        // Rounding may leave a column without weight in `low`: it must not be drawn, ever.
+        // Rounding may leave a column of weight 0 in `low`. Such a column must never be drawn.
         let heaviest = (0..n).max_by(|&a, &b| weights[a as usize].total_cmp(&weights[b as usize]))?;
         for (entry, _) in entries.iter_mut().zip(weights).filter(|(e, w)| **w == 0.0 && e.own != 0) {
             *entry = Entry { own: 0, alias: heaviest };
@@ -47,10 +48,11 @@ impl AliasTable {
         Some(AliasTable { entries })
     }
 
-    /// An index with the probability of its weight, by uniform random bits.
+    /// Turns uniform random bits into an index. Each index has the probability weight ÷ sum of weights.
     #[inline]
     pub fn draw(&self, bits: [u32; 2]) -> usize {
-        // The high word of bits × n is the column, uniform to n/2³²; the second word chooses within it.
+        // The high word of bits × n is the column, uniform up to n/2³². The second word chooses between the column's
+        // own index and its alias.
         let column = ((u64::from(bits[0]) * self.entries.len() as u64) >> 32) as usize;
         let entry = self.entries[column];
         if bits[1] < entry.own { column } else { entry.alias as usize }

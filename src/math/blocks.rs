@@ -1,15 +1,19 @@
 //! Points that cover their domain evenly, in blocks of sixteen.
 //!
-//! Inside a block every pair of dimensions has an Owen-scrambled (0,2)-sequence of its own, in an order of its own
-//! ("padding": Kollig & Keller 2002, Burley, *Practical Hash-based Owen Scrambling*, JCGT 9(4), 2020): in each pair one
-//! point lies in every elementary interval of area 1/16 (1 × 16, 2 × 8, 4 × 4, …), and the first 2, 4 and 8 points are
-//! as even. Blocks are independent of each other. So the spread between the means of blocks is an honest measure of
-//! the error, which the spread between the points is not (it overestimates, as it knows nothing of the strata); and a
-//! run of more blocks continues a shorter one.
+//! Inside a block every pair of dimensions has its own Owen-scrambled (0,2)-sequence in its own order ("padding":
+//! Kollig & Keller 2002, Burley, *Practical Hash-based Owen Scrambling*, JCGT 9(4), 2020). In each pair, every
+//! elementary interval of area 1/16 (1 × 16, 2 × 8, 4 × 4, …) holds one point. The first 2, 4 and 8 points are
+//! stratified likewise.
 //!
-//! With sixteen points Owen's scrambling needs no approximation by hashing permutations. It flips every bit of a
-//! coordinate by a random bit of its own for every value of the bits above it. Four bits tell the points apart, which
-//! takes 1 + 2 + 4 + 8 = 15 random bits ([`scrambled`]); below them each point is alone and has bits of its own.
+//! Blocks are independent of each other. This has two uses:
+//! * The spread between the means of blocks measures the error of their mean. The spread between single points would
+//!   overestimate it, because it ignores the stratification.
+//! * A run of more blocks continues a shorter run.
+//!
+//! Owen's scrambling flips each bit of a coordinate by a random bit that depends on the values of all higher bits. Four
+//! bits tell sixteen points apart, so a coordinate needs 1 + 2 + 4 + 8 = 15 random bits ([`scrambled`]). These are few
+//! enough to draw directly; longer sequences approximate them by hashing. The bits below the fourth are independent
+//! random bits for each point.
 
 use glam::Vec2;
 
@@ -21,10 +25,10 @@ pub const BLOCK: u32 = 16;
 /// Bits that tell the points of a block apart.
 const BITS: u32 = BLOCK.ilog2();
 
-/// Random bits that scrambling takes.
+/// Random bits that scrambling one coordinate takes.
 const TREE_BITS: u32 = BLOCK - 1;
 
-/// Odd constants that spread counters over 64 bits: the fractional parts of the golden ratio and of √2, × 2⁶⁴.
+/// Odd factors that distribute small counters over 64 bits: the fractional parts of the golden ratio and of √2, × 2⁶⁴.
 const PAIR_STEP: u64 = 0x9E37_79B9_7F4A_7C15;
 const INDEX_STEP: u64 = 0x6A09_E667_F3BC_C909;
 
@@ -35,14 +39,15 @@ pub struct Block {
 }
 
 impl Block {
-    /// Named as streams of [`Random`] are: blocks of different names are independent.
+    /// The four arguments name the block as they name a stream of [`Random`]. Blocks of different names are
+    /// independent.
     pub fn new(seed: u64, purpose: Purpose, a: u64, b: u64) -> Block {
         let mut random = Random::new(seed, purpose, a, b);
         let high = u64::from(random.bits());
         Block { key: (high << 32) | u64::from(random.bits()) }
     }
 
-    /// Point `index` < [`BLOCK`], at its first dimension.
+    /// Point `index` of the block, `index` < [`BLOCK`]. Reading starts at the first dimension.
     pub fn sample(&self, index: u32) -> BlockSample {
         debug_assert!(index < BLOCK);
         BlockSample { key: self.key, index, pair: 0, second: None }
@@ -56,19 +61,19 @@ pub struct BlockSample {
     index: u32,
     /// Number of the next pair of dimensions.
     pair: u32,
-    /// The pair's second dimension, where only the first was used.
+    /// The second dimension of a pair of which only the first has been read.
     second: Option<u32>,
 }
 
 impl BlockSample {
-    /// Goes on at pair `pair`, so that decisions keep their dimensions whatever was drawn before.
+    /// Continues reading at pair `pair`. Each decision thus keeps its dimensions, whatever was drawn before it.
     #[inline]
     pub fn seek(&mut self, pair: u32) {
         self.pair = pair;
         self.second = None;
     }
 
-    /// A word for decisions by hashing ([`crate::trace::Ray::salt`]); takes no dimension.
+    /// A word for decisions by hashing ([`crate::trace::Ray::salt`]). It uses up no dimension.
     #[inline]
     pub fn salt(&self) -> u32 {
         (self.key as u32) ^ (self.index << 28) ^ self.pair.wrapping_mul(PAIR_STEP as u32)
@@ -82,7 +87,7 @@ impl BlockSample {
         let index = scrambled(self.index, scramble as u32);
         let x = scrambled(van_der_corput(index), (scramble >> TREE_BITS) as u32);
         let y = scrambled(sobol(index), (scramble >> (2 * TREE_BITS)) as u32);
-        // The high bits of the two halves of `below` go under the four that stratify.
+        // The two halves of `below` fill the bits below the four that stratify.
         [(x << (32 - BITS)) | (below as u32 >> BITS), (y << (32 - BITS)) | ((below >> 32) as u32 >> BITS)]
     }
 }
@@ -103,7 +108,7 @@ impl Numbers for BlockSample {
         first
     }
 
-    /// The next whole pair: a second dimension left over is passed by.
+    /// The next whole pair. It skips a second dimension that has not been read.
     #[inline]
     fn pair(&mut self) -> Vec2 {
         self.second = None;
@@ -111,7 +116,8 @@ impl Numbers for BlockSample {
     }
 }
 
-/// Owen's scrambling of four bits: bit k from the top is flipped by the random bit that belongs to the bits above it.
+/// Owen's scrambling of four bits. Bit k from the top is flipped by the random bit that belongs to the values of the
+/// bits above it.
 #[inline]
 fn scrambled(value: u32, random: u32) -> u32 {
     let flip = |k: u32| {
@@ -157,7 +163,7 @@ mod tests {
     fn every_elementary_interval_holds_one_point() {
         for b in 0..50 {
             for pair in 0..6 {
-                // Prefixes of a power of two too.
+                // Prefixes whose length is a power of two are stratified too.
                 for n in [2u32, 4, 8, 16] {
                     let points = points(block(b), pair, n);
                     for columns in (0..=n.ilog2()).map(|k| 1 << k) {
@@ -183,7 +189,7 @@ mod tests {
                 let mut count = [0f64; 64];
                 for b in 0..n {
                     let p = points(block(b), pair, 16)[index];
-                    // The coordinates themselves, and what is below the bits that stratify.
+                    // The coordinates themselves, or their bits below those that stratify.
                     let p = if high { p } else { (p * 16.0).fract() };
                     count[(p.x * 8.0) as usize * 8 + (p.y * 8.0) as usize] += 1.0;
                 }
@@ -196,8 +202,8 @@ mod tests {
 
     #[test]
     fn blocks_and_pairs_of_dimensions_are_independent() {
-        // Correlation of the same point's coordinates in two blocks, or in two pairs of one block: over 20,000 tries
-        // its standard error is 0.007; five of them, and nine correlations are looked at.
+        // Correlation of one point's coordinates in two blocks, or in two pairs of one block. From 20,000 pairs of
+        // values its standard error is 0.007; the bound is five of them, because nine correlations are tested.
         let n = 20_000;
         let x = |b: u64, pair: u32, index: usize| f64::from(points(block(b), pair, 16)[index].x) - 0.5;
         let correlation = |f: &dyn Fn(u64) -> f64| (0..n).map(f).sum::<f64>() * 12.0 / n as f64;
@@ -210,9 +216,9 @@ mod tests {
     }
 
     #[test]
-    fn block_means_tell_their_own_error() {
-        // The mean of x·y over a block: exact 1/4. The spread of 4000 block means predicts the error of their mean, and
-        // lies far below that of sixteen independent points, 7/144/16.
+    fn block_means_predict_their_error() {
+        // The mean of x·y over a block is 1/4. The spread of 4000 block means predicts the error of their mean. It is
+        // far below the spread of sixteen independent points, 7/144/16.
         let means: Vec<f64> = (0..4000)
             .map(|b| points(block(b), 3, 16).iter().map(|p| f64::from(p.x * p.y)).sum::<f64>() / 16.0)
             .collect();
@@ -231,7 +237,7 @@ mod tests {
         let mut b = block(0).sample(7);
         assert_eq!(b.pair(), Vec2::new(x, y));
         let first = b.uniform();
-        // The other half of the pair is passed by.
+        // This skips the other half of the pair.
         let next = b.pair();
         b.seek(1);
         assert_eq!(b.pair().x, first);

@@ -9,7 +9,7 @@ pub fn luminance(linear: Vec3) -> f32 {
     linear.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// The sRGB code in [0,1] of one linear channel in [0,1] (IEC 61966-2-1); what lies outside is clamped, NaN gives 0.
+/// The sRGB code in [0,1] of one linear channel in [0,1] (IEC 61966-2-1). Values outside are clamped; NaN gives 0.
 ///
 /// Undone by [`linear_from_srgb`].
 pub fn srgb_from_linear(linear: f32) -> f32 {
@@ -17,7 +17,7 @@ pub fn srgb_from_linear(linear: f32) -> f32 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// The linear channel in [0,1] of one sRGB code in [0,1] (IEC 61966-2-1); what lies outside is clamped, NaN gives 0.
+/// The linear channel in [0,1] of one sRGB code in [0,1] (IEC 61966-2-1). Values outside are clamped; NaN gives 0.
 ///
 /// Undone by [`srgb_from_linear`].
 pub fn linear_from_srgb(code: f32) -> f32 {
@@ -25,15 +25,15 @@ pub fn linear_from_srgb(code: f32) -> f32 {
     if code <= 0.040_45 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
 }
 
-/// The nearest 8-bit value of a code in [0,1]; what lies outside is clamped, NaN gives 0.
+/// The nearest 8-bit value of a code in [0,1]. Values outside are clamped; NaN gives 0.
 ///
 /// Undone by `value / 255`.
 pub fn byte_from_unit(code: f32) -> u8 {
-    // The cast saturates and takes NaN to 0.
+    // The cast saturates and turns NaN into 0.
     (code * 255.0).round() as u8
 }
 
-/// `f32::clamp` keeps NaN; a picture needs a colour.
+/// Clamps to [0,1] and replaces NaN by 0. `f32::clamp` would keep NaN, which has no colour.
 fn clamp_unit(value: f32) -> f32 {
     if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) }
 }
@@ -69,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_colour_gets_one() {
+    fn nan_infinite_and_negative_values_get_a_colour() {
         assert_eq!(srgb_from_linear(f32::NAN), 0.0);
         assert!((srgb_from_linear(f32::INFINITY) - 1.0).abs() < 1e-6);
         assert_eq!(srgb_from_linear(-1.0), 0.0);

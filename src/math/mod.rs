@@ -1,4 +1,4 @@
-//! Numbers: maps between domains, sampling, statistics. Knows no scene and no probes.
+//! Numbers: maps between domains, sampling, statistics. This module knows neither scenes nor probes.
 
 pub mod alias;
 pub mod blocks;

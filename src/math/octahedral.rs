@@ -1,24 +1,24 @@
 //! The octahedral map between unit directions and the square `oct` ∈ [−1,1]², its inverse and its density.
 //!
-//! Source: Cigolle et al., *A Survey of Efficient Representations for Independent Unit Vectors*, JCGT 3(2), 2014.
-//! The pole is +Z; `oct` is reached from texture coordinates by `oct = 2·uv − 1`. Maps of probes are square, row = v,
-//! column = u, with texel centres at `uv = (i + ½)/R`.
+//! Source: Cigolle et al., *A Survey of Efficient Representations for Independent Unit Vectors*, JCGT 3(2), 2014. The
+//! pole is +Z. Texture coordinates give `oct = 2·uv − 1`. The maps of probes are square: the row follows v, the column
+//! follows u, and texel centres lie at `uv = (i + ½)/R` for the resolution R.
 
 use glam::{Vec2, Vec3};
 
-/// 1 for positive numbers and zero, −1 for negative ones (so that the fold has no hole at 0).
+/// 1 for positive numbers and zero, −1 for negative ones. A sign of 0 would map the axes to the wrong place.
 #[inline]
 fn sign_not_zero(v: Vec2) -> Vec2 {
     Vec2::new(if v.x >= 0.0 { 1.0 } else { -1.0 }, if v.y >= 0.0 { 1.0 } else { -1.0 })
 }
 
-/// Folds the lower half of the octahedron over the upper one (and back: the fold is its own inverse).
+/// Folds the lower half of the octahedron onto the corners of the square. The fold is its own inverse.
 #[inline]
 fn fold(p: Vec2) -> Vec2 {
     (Vec2::ONE - Vec2::new(p.y, p.x).abs()) * sign_not_zero(p)
 }
 
-/// `oct` of a direction of any length but zero; inverse of [`direction_from_oct`].
+/// `oct` of a direction of any length above zero. Inverse of [`direction_from_oct`].
 #[inline]
 pub fn oct_from_direction(direction: Vec3) -> Vec2 {
     let scale = 1.0 / (direction.x.abs() + direction.y.abs() + direction.z.abs());
@@ -26,7 +26,7 @@ pub fn oct_from_direction(direction: Vec3) -> Vec2 {
     if direction.z >= 0.0 { p } else { fold(p) }
 }
 
-/// The point of the octahedron |x|+|y|+|z| = 1 above or below `oct`.
+/// The point of the octahedron |x| + |y| + |z| = 1 that `oct` stands for.
 #[inline]
 fn point_on_octahedron(oct: Vec2) -> Vec3 {
     let z = 1.0 - oct.x.abs() - oct.y.abs();
@@ -40,13 +40,14 @@ pub fn direction_from_oct(oct: Vec2) -> Vec3 {
 
 /// Solid angle per area of the square, dω/(du dv), in sr.
 ///
-/// A face of the octahedron has the normal (1,1,1)/√3 and lies 1/√3 from the centre; a patch du·dv of the square is a
-/// patch √3·du·dv of the face, seen at distance |p| under the cosine 1/(√3·|p|): dω = du·dv/|p|³.
+/// A face of the octahedron has the normal (1,1,1)/√3 and lies 1/√3 from the centre. A patch du·dv of the square is a
+/// patch of area √3·du·dv on the face. The centre sees it at distance |p| and under the cosine 1/(√3·|p|), so
+/// dω = √3·du·dv · 1/(√3·|p|) / |p|² = du·dv/|p|³.
 pub fn solid_angle_density(oct: Vec2) -> f32 {
     direction_and_density(oct).1
 }
 
-/// [`direction_from_oct`] and [`solid_angle_density`] at once, for one square root.
+/// [`direction_from_oct`] and [`solid_angle_density`] together. Both need the same square root.
 #[inline]
 pub fn direction_and_density(oct: Vec2) -> (Vec3, f32) {
     let p = point_on_octahedron(oct);
@@ -64,8 +65,9 @@ pub fn texel_direction(column: usize, row: usize, resolution: usize) -> Vec3 {
     direction_from_oct(Vec2::new(texel_centre(column, resolution), texel_centre(row, resolution)))
 }
 
-/// Where a texel outside the map, up to one step, continues inside: edges mirror across their middle, corners go to
-/// the diagonally opposite corner. Indices count from −1 to `resolution`.
+/// The texel inside the map that continues it at (`column`, `row`), at most one step outside: both indices run from −1
+/// to `resolution`. A step across an edge arrives mirrored about the middle of that edge; a step across a corner
+/// arrives at the diagonally opposite corner.
 pub fn wrap_texel(column: isize, row: isize, resolution: usize) -> (usize, usize) {
     let last = resolution as isize - 1;
     let (mut c, mut r) = (column, row);
@@ -74,7 +76,8 @@ pub fn wrap_texel(column: isize, row: isize, resolution: usize) -> (usize, usize
         r = r.clamp(0, last);
     }
     if c < 0 || c > last {
-        // Reached for side edges, and for corners whose column the step above has mirrored to the other outside.
+        // This covers the side edges. It also covers corners, whose column the step above has mirrored to the other
+        // side but left outside.
         r = last - r;
         c = c.clamp(0, last);
     }

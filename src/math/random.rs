@@ -1,4 +1,4 @@
-//! Random numbers that depend on what they are for, never on which thread draws them.
+//! Random numbers that depend on their purpose and never on the thread that draws them.
 
 use glam::Vec2;
 use rand_pcg::Pcg32;
@@ -12,32 +12,33 @@ pub enum Purpose {
     Capture = 1,
     /// Light samples at probe centres.
     ProbeEmission = 2,
-    /// Sub-samples of a pixel whose ray meets a translucent surface.
+    /// Rays through a pixel, which translucent surfaces stop by chance.
     Pixel = 3,
     /// Points on surfaces from which visibility is measured.
     SurfaceVisibility = 4,
     /// Paths of the reference.
     Path = 5,
-    /// Paths from what capture rays hit.
+    /// Paths from the points that capture rays hit.
     ProbePaths = 6,
-    /// Noise that is added to a reference, to see what its own noise does to FLIP.
+    /// Noise added to a reference, to measure how the reference's own noise changes FLIP.
     FlipReplicate = 16,
 }
 
-/// Where random decisions take their numbers from: a [`Random`] stream, or points that cover their domain evenly
+/// A source of numbers for random decisions: a [`Random`] stream, or a point of an evenly distributed set
 /// ([`super::blocks::BlockSample`]).
 pub trait Numbers {
     /// Uniform in [0,1).
     fn uniform(&mut self) -> f32;
 
-    /// Uniform over all words.
+    /// Uniform over all 32-bit words.
     fn bits(&mut self) -> u32;
 
-    /// Uniform in the unit square; for decisions in two dimensions that belong together.
+    /// Uniform in the unit square, for a decision that takes two dimensions.
     fn pair(&mut self) -> Vec2;
 }
 
-/// One stream, named by seed, purpose and up to two indices (probe and texel, pixel and sample, …).
+/// One stream, named by a seed, a purpose and two indices (probe and texel, pixel and sample, …). Equal names give
+/// equal numbers.
 #[derive(Debug, Clone)]
 pub struct Random(Pcg32);
 
@@ -65,29 +66,32 @@ pub fn unit_from_bits(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / (1u32 << 24) as f32)
 }
 
-/// Points in four dimensions that fill the unit cube evenly from a random start: a Kronecker sequence with the powers of
-/// 1/φ₄, φ₄ the positive root of x⁵ = x + 1 (Roberts, *The Unreasonable Effectiveness of Quasirandom Sequences*, 2018),
-/// in units of 2⁻³², where wrapping around is free. Each point for itself is uniform.
+/// An endless sequence of points that fill the unit cube of four dimensions evenly, from a random start.
+///
+/// It is a Kronecker sequence: each point is the previous one plus a constant step, modulo 1. The steps are the powers
+/// of 1/φ₄, where φ₄ is the positive root of x⁵ = x + 1 (Roberts, *The Unreasonable Effectiveness of Quasirandom
+/// Sequences*, 2018). Coordinates are integers in units of 2⁻³², so their overflow is the modulo. Each single point is
+/// uniform.
 #[derive(Debug, Clone)]
-pub struct Spread([u32; 4]);
+pub struct KroneckerSequence([u32; 4]);
 
-impl Spread {
+impl KroneckerSequence {
     /// 2³²·φ₄⁻¹ … 2³²·φ₄⁻⁴.
     const STEP: [u32; 4] = [3_679_390_609, 3_152_041_523, 2_700_274_806, 2_313_257_605];
 
-    pub fn new(random: &mut Random) -> Spread {
-        Spread(std::array::from_fn(|_| random.bits()))
+    pub fn new(random: &mut Random) -> KroneckerSequence {
+        KroneckerSequence(std::array::from_fn(|_| random.bits()))
     }
 }
 
-impl Iterator for Spread {
+impl Iterator for KroneckerSequence {
     type Item = [u32; 4];
 
-    /// Endless.
+    /// Never `None`.
     #[inline]
     fn next(&mut self) -> Option<[u32; 4]> {
         let point = self.0;
-        self.0 = std::array::from_fn(|i| point[i].wrapping_add(Spread::STEP[i]));
+        self.0 = std::array::from_fn(|i| point[i].wrapping_add(KroneckerSequence::STEP[i]));
         Some(point)
     }
 }
@@ -119,7 +123,8 @@ pub(super) fn mix(x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// Uniform in [0,1) from three words, for decisions that must not depend on the order of asking.
+/// A number in [0,1) that depends on three words alone. It serves decisions whose result must not depend on the order
+/// in which they are made.
 pub fn hash_to_unit(a: u32, b: u32, c: u32) -> f32 {
     let bits = mix(mix((u64::from(a) << 32) | u64::from(b)) ^ u64::from(c));
     (bits >> 40) as f32 * (1.0 / (1u32 << 24) as f32)
@@ -151,5 +156,18 @@ mod tests {
         let mean: f64 = (0..n).map(|i| Random::new(7, Purpose::Capture, i, 0).uniform() as f64).sum::<f64>() / n as f64;
         // Standard error 1/√(12·4096) = 0.0045; five of them.
         assert!((mean - 0.5).abs() < 0.0226, "{mean}");
+    }
+
+    #[test]
+    fn kronecker_points_fill_every_dimension_evenly() {
+        let mut random = Random::new(7, Purpose::Capture, 1, 0);
+        let n = 4096;
+        let points: Vec<[u32; 4]> = KroneckerSequence::new(&mut random).take(n).collect();
+        for dimension in 0..4 {
+            let mut count = [0; 64];
+            points.iter().for_each(|p| count[(p[dimension] >> 26) as usize] += 1);
+            // 64 points per interval. Of independent points one count in three deviates by more than 8; here none may.
+            assert!(count.iter().all(|c| (56..=72).contains(c)), "dimension {dimension}: {count:?}");
+        }
     }
 }

@@ -1,8 +1,9 @@
-//! Running moments that do not cancel.
+//! Running mean and variance without cancellation.
 
 /// Weighted mean and central second moment (Welford's update in West's weighted form, 1979).
 ///
-/// `E[r²] − E[r]²` formed from raw sums loses all digits when the spread is small against the mean; this does not.
+/// Raw sums would give the variance as `E[x²] − E[x]²`. That difference loses all digits when the spread is small
+/// against the mean. The update used here keeps them.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Moments {
     weight: f64,
@@ -17,7 +18,7 @@ impl Moments {
         self.merge(&Moments { weight, mean: x, scatter: 0.0 });
     }
 
-    /// Adds a set with this mean and variance as one element of weight `weight` ≥ 0.
+    /// Adds a set of values of this mean and variance, whose weights sum to `weight` ≥ 0.
     pub fn add_set(&mut self, mean: f64, variance: f64, weight: f64) {
         self.merge(&Moments { weight, mean, scatter: variance * weight });
     }
@@ -43,7 +44,8 @@ impl Moments {
         self.mean
     }
 
-    /// Variance of the weighted set itself (not an estimate for a population); never negative, 0 for an empty set.
+    /// Variance of the weighted set itself, not an estimate for a larger population. Never negative; 0 for an empty
+    /// set.
     pub fn variance(&self) -> f64 {
         if self.weight > 0.0 { self.scatter / self.weight } else { 0.0 }
     }

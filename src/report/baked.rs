@@ -1,5 +1,5 @@
-//! What is wrong with the probes themselves, before anything is interpolated between them: their irradiance against the
-//! same probes' by full paths.
+//! The error of the probes themselves, without the error of interpolation: the stored irradiance of each probe against
+//! the irradiance that full paths give at the same probe.
 
 use glam::Vec3A;
 use serde::{Deserialize, Serialize};
@@ -9,30 +9,31 @@ use crate::math::color::luminance;
 use crate::probe::Volume;
 use crate::probe::transport::truth::Truth;
 
-/// Sums run over all texels of active probes by their solid angle, in luminance. All are shares of ΣE_path.
+/// Errors of the stored irradiance E as shares of ΣE_path. Sums are over the luminance of all texels of active probes,
+/// weighted by solid angle. `null` if ΣE_path is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct BakedFigures {
-    /// Σ(E − E_path): positive where the bake is too bright.
+    /// Σ(E − E_path). Positive if the bake is too bright.
     pub bias: Option<f64>,
-    /// Σ max(0, E − E_path): light that leaked into probes, and all other excess.
+    /// Σ max(0, E − E_path): light that leaked into probes, and any other excess.
     pub light: Option<f64>,
-    /// Σ max(0, E_path − E): light that the bake lost.
+    /// Σ max(0, E_path − E): light that is missing from the bake.
     pub dark: Option<f64>,
 }
 
-/// The probes of a file against the truth.
+/// The errors of the probes of a file, with their uncertainty.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BakedReport {
     #[serde(flatten)]
     pub figures: BakedFigures,
-    /// From the spread between independent runs of the truth (jackknife).
+    /// From the spread between independent runs of the path-traced truth (jackknife).
     pub standard_error: BakedFigures,
-    /// Paths from every captured hit, all runs together.
+    /// Paths from every captured hit, summed over the runs.
     pub paths_per_hit: u64,
     pub time_s: f64,
 }
 
-/// Sums from which the figures follow.
+/// The sums in the definitions of [`BakedFigures`].
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     difference: f64,
@@ -41,8 +42,8 @@ struct Sums {
     truth: f64,
 }
 
-/// Compares `volume` with the truth at its probes. The noise of the truth, which would pass for excess and for loss
-/// alike, is taken out to first order ([`fold`]).
+/// Compares `volume` with the path-traced truth at its probes. Returns the figures and their standard errors. Noise of
+/// the truth would raise `light` and `dark`; this is corrected to first order ([`fold`]).
 pub fn measure(volume: &Volume, truth: &Truth) -> (BakedFigures, BakedFigures) {
     let runs = truth.runs.len();
     let all = figures(volume, truth, None);
@@ -58,7 +59,7 @@ pub fn measure(volume: &Volume, truth: &Truth) -> (BakedFigures, BakedFigures) {
     (all, BakedFigures { bias: error(|f| f.bias), light: error(|f| f.light), dark: error(|f| f.dark) })
 }
 
-/// The figures against all runs of the truth but one.
+/// The figures against the mean of all runs of the truth except the run `without`.
 fn figures(volume: &Volume, truth: &Truth, without: Option<usize>) -> BakedFigures {
     let axes = volume.irradiance.axes();
     let used: Vec<usize> = (0..truth.runs.len()).filter(|&run| Some(run) != without).collect();
@@ -76,7 +77,7 @@ fn figures(volume: &Volume, truth: &Truth, without: Option<usize>) -> BakedFigur
             found.push((weight, of(stored.into()) - mean, spread / (n * (n - 1.0))));
             sums.truth += weight * mean;
         }
-        // How large differences are, from all of the probe's texels: that of one is as noisy as itself.
+        // Mean squared difference without noise, from all texels of the probe. A single texel would be too noisy.
         let size = found.iter().map(|(_, d, v)| d * d - v).sum::<f64>() / texels.max(1) as f64;
         for (weight, d, v) in found {
             let folded = fold(d, size.max(0.0).sqrt(), v) / 2.0;

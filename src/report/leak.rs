@@ -1,8 +1,8 @@
-//! Leak figures: light that came through walls, and light that the visibility test took away by mistake.
+//! Leak figures: light that passes through walls, and light that the visibility test removes by mistake.
 //!
-//! All but [`dark_region`] compare against Ê, the same weights with exact ray visibility, so they are free of interpolation
-//! error and need no reference. Sums run over image points by their share of a pixel, in luminance; points that see no probe at all
-//! are left out and counted.
+//! All figures except [`dark_region`] compare the irradiance E with Ê, the irradiance from the same weights with exact
+//! ray visibility. So they contain no interpolation error and need no reference. Sums are over the luminance at image
+//! points, weighted by the share of the pixel. Points that see none of their probes are left out and counted.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -10,42 +10,43 @@ use serde::{Deserialize, Serialize};
 use super::reference_layers::ReferenceLayers;
 use crate::math::color::luminance;
 use crate::probe::query::Query;
-use crate::shade::methods::Method;
 use crate::shade::points::ImagePoint;
+use crate::shade::visibility_modes::VisibilityMode;
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Leak {
-    /// Σ max(0, E − Ê) ÷ ΣÊ; `null` where no light is to be seen.
+    /// Σ max(0, E − Ê) ÷ ΣÊ. `null` if ΣÊ is 0.
     pub light: Option<f64>,
-    /// Σ max(0, Ê − E) ÷ ΣÊ; `null` where no light is to be seen.
+    /// Σ max(0, Ê − E) ÷ ΣÊ. `null` if ΣÊ is 0.
     pub dark: Option<f64>,
-    /// Share of the irradiance that came from probes not visible; `null` where there is no irradiance.
+    /// Share of the irradiance that comes from hidden probes. `null` if the irradiance is 0.
     pub fraction: Option<f64>,
-    /// Mean share of the weight that probes not visible have; `null` without points.
+    /// Mean share of the weights that hidden probes have. `null` without points.
     pub weight: Option<f64>,
     /// Share of the image's points that see none of their probes.
     pub unseen: f64,
-    /// Mean irradiance where the reference has none, as a share of the reference's mean: see [`dark_region`]; `null` without a
-    /// reference.
+    /// Mean irradiance where the reference is dark, as a share of the reference's mean; see [`dark_region`]. `null`
+    /// without a reference.
     pub dark_region: Option<f64>,
-    /// Σ max(0, E_p − E_path) ÷ ΣE_path over active probes: what leaked into the probes themselves
-    /// ([`super::baked`]); `null` without a traced reference.
+    /// Σ max(0, E_p − E_path) ÷ ΣE_path over active probes: the light that leaked into the probes themselves
+    /// ([`super::baked`]). `null` without a traced reference.
     pub baked: Option<f64>,
 }
 
-/// Irradiance that counts as none, as a share of the reference's mean over the picture.
+/// A pixel is dark if its irradiance is below this share of the reference's mean over the picture.
 const DARK_SHARE: f64 = 1.0e-3;
 
-/// How sure the reference must be that a pixel is dark: standard errors of its luminance.
+/// Margin of the test for dark pixels, in standard errors of the pixel's luminance.
 const DARK_SIGMAS: f64 = 3.0;
 
-/// Mean luminance of a method's indirect irradiance over the pixels with E_ref + 3σ < 10⁻³·mean(E_ref), ÷ mean(E_ref).
+/// Mean luminance of the indirect `irradiance` over dark pixels ÷ mean(E_ref). Dark pixels are those with
+/// E_ref + 3σ < 10⁻³·mean(E_ref), where σ is the standard error of E_ref.
 ///
-/// `shown`: whether a pixel shows a surface. `None` where no pixel is dark, where all are, and where the reference does not know
-/// its σ.
+/// `shown` tells for each pixel whether it shows a surface. The result is `None` if no pixel is dark, if the whole
+/// reference is black, or if σ is not known.
 ///
 /// # Panics
-/// When the pixels of the two or of `shown` differ in number.
+/// If `irradiance` or `shown` have fewer pixels than the reference, or `irradiance` has more.
 pub fn dark_region(irradiance: &[Vec3], reference: &ReferenceLayers, shown: &[bool]) -> Option<f64> {
     assert_eq!(irradiance.len(), reference.irradiance.len(), "pixels of the picture");
     let noise = reference.noise.as_ref()?;
@@ -63,12 +64,13 @@ pub fn dark_region(irradiance: &[Vec3], reference: &ReferenceLayers, shown: &[bo
     (count > 0.0).then(|| sum / count / mean)
 }
 
-/// Figures of one method from its irradiance and that with exact visibility.
+/// The leak figures of one visibility mode, except `dark_region` and `baked`. `irradiance` is that of the mode and
+/// `exact` that of [`VisibilityMode::Ray`], both per point.
 pub fn measure(
     query: &Query,
     points: &[ImagePoint],
     masks: &[u8],
-    method: Method,
+    mode: VisibilityMode,
     irradiance: &[Vec3],
     exact: &[Vec3],
 ) -> Leak {
@@ -77,7 +79,7 @@ pub fn measure(
     let (mut hidden_weight, mut seen, mut unseen) = (0.0f64, 0.0f64, 0.0f64);
     for (i, point) in points.iter().enumerate() {
         let share = f64::from(point.weight);
-        if query.weights(&point.query(), Method::Ray.visibility(masks[i])).total() <= 0.0 {
+        if query.weights(&point.query(), VisibilityMode::Ray.visibility(masks[i])).total() <= 0.0 {
             unseen += share;
             continue;
         }
@@ -87,7 +89,7 @@ pub fn measure(
         dark += (e_exact - e).max(0.0) * share;
         total += e_exact * share;
 
-        let corners = query.weights(&point.query(), method.visibility(masks[i]));
+        let corners = query.weights(&point.query(), mode.visibility(masks[i]));
         let sum = f64::from(corners.total());
         for k in 0..8 {
             let weight = f64::from(corners.weights[k]) / sum;

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::header::Header;
 
-/// Version of the report's layout.
+/// Version of the layout of the report.
 pub const SCHEMA: &str = "lightprobe-reference/1";
 
 #[derive(Debug, Clone, Serialize)]
@@ -16,21 +16,21 @@ pub struct ReferenceReport {
     pub height: u32,
     pub transport: String,
     pub max_bounces: Option<u32>,
-    /// With it the result is biased.
+    /// See [`crate::light::path::PathSettings::firefly_clamp`]. If it is set, the result is biased.
     pub firefly_clamp: Option<f32>,
     /// Samples per pixel in the file.
     pub spp: u32,
-    /// Of them those that were there before this run.
+    /// Samples per pixel that an earlier run had traced.
     pub spp_resumed: u32,
-    /// Along paths (`primary`) and towards lights (`shadow`), of all samples.
+    /// Rays of all samples along paths (`primary`) and towards lights (`shadow`).
     pub rays: Rays,
-    /// Of this run.
+    /// Times of this run, seconds.
     pub time_s: ReferenceTimes,
-    /// Rays of this run ÷ `time_s.trace`; `null` where there was nothing to add.
+    /// Rays of this run ÷ `time_s.trace`. `null` if this run added no samples.
     pub rays_per_s: Option<f64>,
-    /// Of `irradiance_indirect`, W·m⁻²; absent below two blocks of 16 samples.
+    /// Noise of `irradiance_indirect`, W·m⁻². `null` below two blocks of 16 samples.
     pub noise: Option<NoiseReport>,
-    /// Samples that were not finite and count as 0.
+    /// Number of samples that were not finite. They count as 0.
     pub non_finite: u64,
     pub peak_memory_bytes: u64,
 }
@@ -54,10 +54,10 @@ pub struct ReferenceTimes {
 pub struct NoiseReport {
     /// Mean of the irradiance over pixels and channels.
     pub mean: f64,
-    /// Mean over pixels and channels of the standard error of the pixel's mean.
+    /// Standard error of a pixel's mean, averaged over pixels and channels.
     pub mean_standard_error: f64,
-    /// That ÷ `mean`; `null` in the dark.
+    /// `mean_standard_error` ÷ `mean`. `null` if the picture is black.
     pub relative: Option<f64>,
-    /// Root of the mean variance: the RMSE that noise alone makes.
+    /// Root of the mean variance. This is the RMSE that noise alone causes.
     pub rms_standard_error: f64,
 }

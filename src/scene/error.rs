@@ -1,11 +1,11 @@
-//! What can be wrong with a scene: every message names the file, the place in it, what is wrong and what to do.
+//! Errors of scenes. Every message names the file, the place in it, the fault and the remedy.
 
 use std::io;
 use std::path::PathBuf;
 
 use thiserror::Error;
 
-/// Why a scene was not loaded. Each message is one line.
+/// The reason why a scene was not loaded. Each message is one line.
 #[derive(Debug, Error)]
 pub enum SceneError {
     /// A file of the scene is absent or unreadable.
@@ -14,19 +14,19 @@ pub enum SceneError {
     /// Neither a GLB container nor glTF 2.0 JSON.
     #[error("{file}: not a glTF 2.0 file: {what}; {remedy}")]
     Format { file: PathBuf, what: String, remedy: &'static str },
-    /// The file needs an extension that the loader does not have.
+    /// The file needs an extension that the loader does not read.
     #[error("{file}: {place} needs the extension {extension}, which lightprobe does not read; {remedy}")]
     Unsupported { file: PathBuf, place: String, extension: String, remedy: &'static str },
     /// Something in the file breaks the rules of glTF.
     #[error("{file}: {place}: {what}; {remedy}")]
     Invalid { file: PathBuf, place: String, what: String, remedy: &'static str },
-    /// A texture image or environment map that cannot be decoded.
+    /// A texture image or environment map cannot be decoded.
     #[error("{file}: {place}: {what}; {remedy}")]
     Image { file: PathBuf, place: String, what: String, remedy: &'static str },
     /// The file asks for far more memory than its own size warrants.
     #[error("{file}: {place}: {what}; {remedy}")]
     TooLarge { file: PathBuf, place: String, what: String, remedy: &'static str },
-    /// Nothing to render.
+    /// The scene has nothing to render.
     #[error(
         "{file}: {what}; export at least one triangle mesh in the default scene and check `extras.lightprobe` marks"
     )]

@@ -29,7 +29,7 @@ impl Scene {
         color
     }
 
-    /// Share of rays that a point of this triangle stops: 1 opaque, 0 or 1 masked, alpha blended.
+    /// Share of rays that a point of this triangle stops: 1 for opaque materials, 0 or 1 for MASK, alpha for BLEND.
     pub fn opacity(&self, triangle: TriangleIndex, barycentric: Vec2) -> f32 {
         match self.material(triangle).alpha_mode {
             AlphaMode::Opaque => 1.0,
@@ -38,7 +38,7 @@ impl Scene {
         }
     }
 
-    /// Diffuse albedo ρ = baseColor·(1 − metallic), each channel in [0,1]; black for unlit surfaces.
+    /// Diffuse albedo ρ = baseColor·(1 − metallic), each channel in [0,1]. Unlit surfaces have 0.
     pub fn albedo(&self, triangle: TriangleIndex, barycentric: Vec2) -> Vec3 {
         let material = self.material(triangle);
         if material.unlit {
@@ -55,7 +55,7 @@ impl Scene {
         ((material.roughness * texel.y).clamp(0.0, 1.0), (material.metallic * texel.z).clamp(0.0, 1.0))
     }
 
-    /// Radiance that the surface sends out by itself from a side that emits, W·m⁻²·sr⁻¹.
+    /// Radiance that an emitting side of the surface emits, W·m⁻²·sr⁻¹.
     pub fn emission(&self, triangle: TriangleIndex, barycentric: Vec2) -> Vec3 {
         let material = self.material(triangle);
         if material.unlit {
@@ -67,7 +67,7 @@ impl Scene {
         material.emission * self.textured(material.emission_texture, triangle, barycentric).truncate()
     }
 
-    /// Shading normal bent by the normal map; `shading_normal` is the interpolated one on the front side.
+    /// The shading normal after the normal map. `shading_normal` is the interpolated normal on the front side.
     pub fn normal_mapped(&self, triangle: TriangleIndex, barycentric: Vec2, shading_normal: Vec3) -> Vec3 {
         let material = self.material(triangle);
         let Some(reference) = material.normal_texture else { return shading_normal };
@@ -82,7 +82,8 @@ impl Scene {
         }
     }
 
-    /// Tangent and bitangent at the point: the file's own, else along the texture's axes.
+    /// Tangent and bitangent at the point. They come from the file's tangents, or from the axes of the texture
+    /// coordinates if the file has no usable tangent.
     fn tangent_frame(
         &self,
         triangle: TriangleIndex,

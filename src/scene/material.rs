@@ -24,7 +24,7 @@ pub enum AlphaMode {
 #[derive(Debug, Clone)]
 pub struct Material {
     pub name: String,
-    /// Linear factor on the base colour texture and vertex colour; alpha in `w`.
+    /// Linear factor on base colour texture and vertex colour, with alpha in `w`.
     pub base_color: Vec4,
     pub base_color_texture: Option<TextureRef>,
     pub metallic: f32,
@@ -38,7 +38,7 @@ pub struct Material {
     pub normal_scale: f32,
     pub alpha_mode: AlphaMode,
     pub double_sided: bool,
-    /// Sends out the base colour as radiance and reflects nothing (`KHR_materials_unlit`).
+    /// The surface emits its base colour as radiance and reflects nothing (`KHR_materials_unlit`).
     pub unlit: bool,
 }
 
@@ -46,7 +46,7 @@ pub struct Material {
 #[derive(Debug, Clone, Copy)]
 pub struct TextureRef {
     pub texture: TextureIndex,
-    /// 0 or 1: which of [`super::Mesh::uvs`].
+    /// Index of the texture coordinates in [`super::Mesh::uvs`], 0 or 1.
     pub uv_set: usize,
     /// `KHR_texture_transform`: uv′ = (transform · (u, v, 1)).xy.
     pub texture_from_uv: Mat3,
@@ -59,7 +59,7 @@ pub enum Wrap {
     ClampToEdge,
 }
 
-/// A decoded image with its sampler. Row 0 is the top row, uv (0, 0) the top-left corner, as in glTF.
+/// A decoded image with its sampler. As in glTF, row 0 is the top row and uv (0, 0) is the top-left corner.
 #[derive(Debug, Clone)]
 pub struct Texture {
     pub width: u32,
@@ -72,7 +72,7 @@ pub struct Texture {
 
 #[derive(Debug, Clone)]
 pub enum Texels {
-    /// RGBA, 8 bits each; RGB is sRGB-encoded where `srgb`, alpha always linear.
+    /// RGBA, 8 bits each. RGB is sRGB-encoded if `srgb` is true; alpha is always linear.
     Rgba8 { data: Vec<[u8; 4]>, srgb: bool },
     /// RGBA from 16-bit images, decoded to linear.
     Rgba32F(Vec<Vec4>),

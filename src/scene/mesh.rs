@@ -1,4 +1,4 @@
-//! All triangles of a scene in one vertex pool.
+//! All triangles of a scene, with one list of vertices.
 
 use std::ops::{Add, Mul};
 
@@ -10,26 +10,28 @@ use super::MaterialIndex;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TriangleIndex(pub u32);
 
-/// World-space triangles relative to [`super::Scene::origin_world`]; instances are written out.
+/// World-space triangles relative to [`super::Scene::origin_world`]. Each instance has its own copy of the triangles.
 ///
-/// Winding: counter-clockwise seen from the front, also under mirroring transforms.
+/// The winding is counter-clockwise as seen from the front, also for instances whose transform mirrors.
 #[derive(Debug, Clone, Default)]
 pub struct Mesh {
     /// Metres, one per vertex.
     pub positions: Vec<Vec3>,
-    /// Unit shading normals, one per vertex; zero where the file gave none or a degenerate one (use the geometric normal).
+    /// Unit shading normals, one per vertex. A normal that is missing or degenerate in the file is zero here; the
+    /// geometric normal then takes its place.
     pub normals: Vec<Vec3>,
-    /// TEXCOORD_0 and TEXCOORD_1, one per vertex; zero where the file gave none.
+    /// TEXCOORD_0 and TEXCOORD_1, one per vertex, or zero if the file has none.
     pub uvs: [Vec<Vec2>; 2],
-    /// Linear RGBA vertex colours, one per vertex, or empty when no mesh of the scene has any.
+    /// Linear RGBA vertex colours, one per vertex. Empty if no mesh of the scene has colours.
     pub colors: Vec<Vec4>,
-    /// Unit tangents (xyz) and handedness (w), one per vertex, or empty when no mesh has any; zero where absent.
+    /// Unit tangents (xyz) and handedness (w), one per vertex. Empty if no mesh has tangents; zero for vertices
+    /// without.
     pub tangents: Vec<Vec4>,
     /// Vertex indices, opaque triangles first.
     pub triangles: Vec<[u32; 3]>,
     /// One per triangle.
     pub materials: Vec<MaterialIndex>,
-    /// The first so many triangles have [`super::AlphaMode::Opaque`] materials; the rest need an alpha test.
+    /// Number of triangles with [`super::AlphaMode::Opaque`] materials. They come first; the rest need an alpha test.
     pub opaque_count: usize,
 }
 
@@ -51,7 +53,7 @@ impl Mesh {
     /// Unit normal of the front side.
     pub fn geometric_normal(&self, triangle: TriangleIndex) -> Vec3 {
         let [a, b, c] = self.corners(triangle).map(|p| p.as_dvec3());
-        // In f64, because slivers of 10⁴:1 leave an f32 cross product few digits.
+        // f64 is needed: for triangles 10⁴ times as long as wide an f32 cross product has few correct digits.
         (b - a).cross(c - a).normalize_or_zero().as_vec3()
     }
 
@@ -61,7 +63,7 @@ impl Mesh {
         (0.5 * (b - a).cross(c - a).length()) as f32
     }
 
-    /// Smallest box around all vertices that triangles use, `None` without triangles.
+    /// Smallest box around all vertices that triangles use. `None` without triangles.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
         let mut vertices = self.triangles.iter().flatten().map(|&v| self.positions[v as usize]);
         let first = vertices.next()?;

@@ -1,7 +1,7 @@
-//! What is lit: triangles, materials, lights, cameras and the sky, in world space, validated once.
+//! The scene: triangles, materials, lights, cameras and the sky, in world space. The loader validates it once.
 //!
-//! Everything is recentred: positions are f32 relative to [`Scene::origin_world`], an f64 point, so that a scene
-//! that lies 10⁶ m from the origin keeps its millimetres.
+//! Positions are f32 and relative to [`Scene::origin_world`], an f64 point in the middle of the scene. So a scene that
+//! stands 10⁶ m from the world's origin keeps its millimetres.
 
 pub mod camera;
 pub mod environment;
@@ -27,12 +27,12 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-/// A loaded scene. Immutable after loading; every index in it is in range and every number finite.
+/// A loaded scene. It does not change after loading. Every index in it is in range, and every number is finite.
 #[derive(Debug, Clone)]
 pub struct Scene {
-    /// File stem of the scene file.
+    /// Name of the scene file without folder and extension.
     pub name: String,
-    /// World-space point that every position here is relative to, metres.
+    /// World-space point to which all positions are relative, metres.
     pub origin_world: DVec3,
     pub mesh: Mesh,
     pub materials: Vec<Material>,
@@ -40,21 +40,21 @@ pub struct Scene {
     pub lights: Vec<PunctualLight>,
     pub cameras: Vec<Camera>,
     pub environment: Environment,
-    /// BLAKE3 of every input byte: scene file, buffers, images and environment map, in the order of reading.
+    /// BLAKE3 over all input bytes in the order of reading: scene file, buffers, images and environment map.
     pub blake3: String,
-    /// The files that were read, in that order.
+    /// The files that were read, in the same order.
     pub files: Vec<PathBuf>,
-    /// What the loader left out or replaced, one sentence each.
+    /// One sentence for each thing that the loader left out or replaced.
     pub warnings: Vec<String>,
     pub dropped: DroppedTriangles,
 }
 
-/// Triangles that the loader dropped because nothing can be traced against them.
+/// Numbers of triangles that the loader dropped because rays cannot hit them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct DroppedTriangles {
-    /// A vertex is NaN or infinite.
+    /// Triangles with a vertex that is NaN or infinite.
     pub non_finite: u64,
-    /// No area: vertices coincide or lie on a line.
+    /// Triangles without area: their vertices coincide or lie on a line.
     pub zero_area: u64,
 }
 

@@ -1,4 +1,4 @@
-//! What the caller may choose about loading.
+//! Options of loading a scene.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -6,14 +6,14 @@ use std::str::FromStr;
 use glam::Vec3;
 use thiserror::Error;
 
-/// Choices of [`super::load`].
+/// Options of [`super::load`].
 #[derive(Debug, Clone)]
 pub struct LoadOptions {
-    /// The sky; glTF itself has none.
+    /// The sky. glTF files contain none.
     pub environment: Option<EnvironmentSource>,
-    /// Index of the glTF scene to load; the file's default scene where `None`.
+    /// Index of the glTF scene to load. `None` loads the file's default scene.
     pub scene: Option<usize>,
-    /// Store images whose texels are all equal as one texel. Never changes what a lookup returns.
+    /// Store an image whose texels are all equal as one texel. Lookups return the same values.
     pub collapse_constant_images: bool,
 }
 
@@ -23,16 +23,16 @@ impl Default for LoadOptions {
     }
 }
 
-/// Where the sky comes from: `FILE.hdr`, `FILE.exr` or `R,G,B`, as the command line has it.
+/// The source of the sky. On the command line it is written `FILE.hdr`, `FILE.exr` or `R,G,B`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum EnvironmentSource {
-    /// The same radiance from everywhere, W·m⁻²·sr⁻¹; finite and not negative.
+    /// One radiance for all directions, W·m⁻²·sr⁻¹. Finite and not negative.
     Constant(Vec3),
     /// An equirectangular map whose centre looks along −Z.
     File(PathBuf),
 }
 
-/// Why a text is no [`EnvironmentSource`].
+/// The reason why a text does not name an [`EnvironmentSource`].
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum EnvironmentSourceError {
     #[error("environment '{0}' is neither a .hdr or .exr file nor three numbers; write FILE.hdr, FILE.exr or R,G,B")]

@@ -1,4 +1,4 @@
-//! Looking textures up.
+//! Texture lookup.
 
 use std::sync::LazyLock;
 
@@ -12,7 +12,7 @@ static LINEAR_FROM_SRGB8: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| linear_from_srgb(code as f32 / 255.0)));
 
 impl Texture {
-    /// Linear RGBA of one texel, indices in range.
+    /// Linear RGBA of one texel. The indices must be in range.
     #[inline]
     fn texel(&self, x: u32, y: u32) -> Vec4 {
         let i = y as usize * self.width as usize + x as usize;
@@ -32,7 +32,8 @@ impl Texture {
         }
     }
 
-    /// Linear RGBA at `uv`, bilinear (nearest where the sampler says so). There are no mip levels: rays are many.
+    /// Linear RGBA at `uv`, interpolated bilinearly, or the nearest texel if the sampler asks for that. There are no
+    /// mip levels, because averaging many rays filters the texture.
     pub fn sample(&self, uv: Vec2) -> Vec4 {
         if self.width == 1 && self.height == 1 {
             return self.texel(0, 0);
@@ -52,12 +53,12 @@ impl Texture {
         top.lerp(bottom, f.y)
     }
 
-    /// Texel index along `axis` of a coordinate that may lie outside.
+    /// Texel index along `axis` (0 columns, 1 rows) for index `i`, which may lie outside the image.
     #[inline]
     fn wrapped(&self, axis: usize, i: i64) -> u32 {
         let size = if axis == 0 { self.width } else { self.height };
         let n = i64::from(size);
-        // Most look-ups lie inside, and spare the division.
+        // Most lookups lie inside. This test saves them a division.
         if (0..n).contains(&i) {
             return i as u32;
         }
@@ -73,8 +74,8 @@ impl Texture {
     }
 }
 
-/// Largest integer not above `x`. `f32::floor` is a function call on processors without SSE 4.1, and so on the
-/// baseline that the crate is compiled for. `as` saturates and sends NaN to 0: hostile coordinates stay in range.
+/// Largest integer not above `x`. It is faster than `f32::floor`, which is a function call on processors without SSE
+/// 4.1, the baseline that the crate is compiled for. The cast saturates and turns NaN into 0, so every result is valid.
 #[inline]
 fn floor(x: f32) -> i64 {
     let truncated = x as i64;

@@ -1,4 +1,4 @@
-//! From what the reference accumulates to the layers of its picture.
+//! From the accumulated quantities of the reference to the layers of its picture.
 
 use glam::Vec3;
 
@@ -10,11 +10,12 @@ use crate::light::World;
 use crate::light::bsdf::{Bsdf, Transport};
 use crate::light::lambert::reflected_radiance;
 
-/// Names of the layers of variances.
+/// Names of the layers with variances.
 pub const BEAUTY_VARIANCE: &str = "beauty_variance";
 pub const IRRADIANCE_INDIRECT_VARIANCE: &str = "irradiance_indirect_variance";
 
-/// What is accumulated where pixels show one point each, and where they show several.
+/// The quantities that are accumulated, by transport. `BLENDED` lists are for scenes whose pixels can show several
+/// points.
 const LAMBERT: &[Quantity] = &[Quantity::IrradianceIndirect];
 const GLTF: &[Quantity] = &[Quantity::IrradianceIndirect, Quantity::Beauty, Quantity::Indirect, Quantity::Glossy];
 const BLENDED: &[Quantity] = &[
@@ -41,18 +42,18 @@ const BLENDED_GLTF: &[Quantity] = &[
     Quantity::Depth,
 ];
 
-/// What pixels show that show one point each.
+/// A view in which each pixel shows one point or the sky, the same for all samples.
 pub(super) struct FixedView {
     pub view: View,
-    /// Per pixel; `NO_POINT` for the sky.
+    /// Per pixel the index of its point in `view.points`, or [`NO_POINT`] for the sky.
     pub point_of_pixel: Vec<u32>,
-    /// Radiance that each point reflects of punctual lights.
+    /// Per point the radiance that it reflects from punctual lights, W·m⁻²·sr⁻¹.
     pub direct: Vec<Vec3>,
 }
 
 pub(super) const NO_POINT: u32 = u32::MAX;
 
-/// What has to be accumulated in this world.
+/// The quantities to accumulate for this scene and transport.
 pub fn quantities(world: &World, transport: Transport) -> &'static [Quantity] {
     match (has_blend(world), transport) {
         (false, Transport::Lambert) => LAMBERT,
@@ -62,7 +63,7 @@ pub fn quantities(world: &World, transport: Transport) -> &'static [Quantity] {
     }
 }
 
-/// Radiance that a point reflects of punctual lights, W·m⁻²·sr⁻¹.
+/// Radiance that a point reflects from punctual lights, W·m⁻²·sr⁻¹.
 pub(super) fn direct_radiance(world: &World, point: &ImagePoint, transport: Transport, salt: u32) -> Vec3 {
     match transport {
         Transport::Lambert => reflected_radiance(point.surface.albedo, point.irradiance_direct),
@@ -73,7 +74,7 @@ pub(super) fn direct_radiance(world: &World, point: &ImagePoint, transport: Tran
     }
 }
 
-/// All layers where pixels show one point each.
+/// All layers of a picture whose pixels show one point each.
 pub(super) fn develop_fixed(film: &Film, fixed: &FixedView) -> LayeredImage {
     let view = &fixed.view;
     let pixels = film.mean(Quantity::IrradianceIndirect).unwrap_or_default();
@@ -88,7 +89,7 @@ pub(super) fn develop_fixed(film: &Film, fixed: &FixedView) -> LayeredImage {
     } else if let Some(variance) = film.variance(Quantity::IrradianceIndirect) {
         let mut beauty = vec![Vec3::ZERO; variance.len()];
         for p in &view.points {
-            // A reflected radiance is linear in the irradiance, so its variance is scaled by the square.
+            // The reflected radiance is a factor times the irradiance, so its variance has the square of that factor.
             let factor = reflected_radiance(p.surface.albedo, Vec3::ONE);
             beauty[p.pixel as usize] = variance[p.pixel as usize] * factor * factor;
         }
@@ -98,7 +99,7 @@ pub(super) fn develop_fixed(film: &Film, fixed: &FixedView) -> LayeredImage {
     image
 }
 
-/// All layers where everything is an average.
+/// All layers of a picture whose pixels can show several points. Each layer is an average over samples.
 pub(super) fn develop_blended(film: &Film, width: u32, height: u32) -> LayeredImage {
     let mut image = LayeredImage::new(width, height);
     for &quantity in film.quantities() {
@@ -110,7 +111,7 @@ pub(super) fn develop_blended(film: &Film, width: u32, height: u32) -> LayeredIm
     image
 }
 
-/// Variances as they were accumulated.
+/// Adds the layers with the accumulated variances.
 fn push_variances(film: &Film, image: &mut LayeredImage) {
     for (quantity, name) in
         [(Quantity::Beauty, BEAUTY_VARIANCE), (Quantity::IrradianceIndirect, IRRADIANCE_INDIRECT_VARIANCE)]

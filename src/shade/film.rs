@@ -1,18 +1,18 @@
-//! What the reference accumulates: per pixel the mean of every quantity over blocks of samples, and for those whose
-//! error is wanted the spread of the blocks' means.
+//! The film of the reference. For each pixel it accumulates the mean of every quantity over blocks of samples. For two
+//! quantities it also accumulates the scatter of the blocks' means, which gives the error.
 //!
-//! Blocks are independent of each other ([`crate::math::blocks`]), so the variance of a mean over n of them is
-//! Σ(x − mean)²/(n(n − 1)); Welford's update keeps it from cancelling. Everything is f64 and every pixel adds its blocks
-//! in their order: a run that is continued ends with the bits of a run that was not.
+//! Blocks are independent of each other ([`crate::math::blocks`]). So the variance of the mean of n blocks is Σ(x −
+//! mean)²/(n(n − 1)). Welford's update computes the sum without cancellation. All values are f64, and each pixel adds
+//! its blocks in order. So a run that was interrupted and continued ends with the same bits as an uninterrupted run.
 //!
-//! Layout: pixel p's record starts at p × stride; it is the quantities in order, three channels of the mean each, and
-//! three of the scatter Σ(x − mean)² where the quantity has one.
+//! Layout: the record of pixel p starts at p × stride. It holds the quantities in order. Each has three channels of the
+//! mean, followed by three channels of the scatter Σ(x − mean)² if the quantity has one.
 
 use glam::{DVec3, Vec3};
 
 use crate::image::LayeredImage;
 
-/// What is measured of a pixel.
+/// A quantity of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     IrradianceIndirect,
@@ -28,7 +28,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// As in layers and channels of the file.
+    /// Name in the layers and channels of the file.
     pub fn name(self) -> &'static str {
         match self {
             Quantity::IrradianceIndirect => "irradiance_indirect",
@@ -44,22 +44,23 @@ impl Quantity {
         }
     }
 
-    /// Whether the spread of its blocks is kept.
+    /// Whether the scatter of the blocks is accumulated.
     fn has_scatter(self) -> bool {
         matches!(self, Quantity::IrradianceIndirect | Quantity::Beauty)
     }
 
+    /// Numbers in a record.
     fn width(self) -> usize {
         if self.has_scatter() { 6 } else { 3 }
     }
 }
 
-/// Accumulated quantities of all pixels.
+/// The accumulated quantities of all pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Film {
     quantities: &'static [Quantity],
     values: Vec<f64>,
-    /// Blocks in the means.
+    /// Number of blocks in the means.
     pub blocks: u32,
 }
 
@@ -73,41 +74,44 @@ impl Film {
         self.quantities
     }
 
-    /// Numbers in a pixel's record.
+    /// Length of a pixel's record.
     pub fn stride(&self) -> usize {
         self.quantities.iter().map(|q| q.width()).sum()
     }
 
-    /// The records of all pixels, for [`add_block`].
+    /// The records of all pixels, which [`add_block`] changes.
     pub fn records(&mut self) -> &mut [f64] {
         &mut self.values
     }
 
+    /// Three numbers of each pixel's record, from `offset` on.
     fn column(&self, offset: usize) -> impl Iterator<Item = DVec3> {
         let stride = self.stride();
         self.values.chunks_exact(stride).map(move |record| DVec3::from_slice(&record[offset..]))
     }
 
+    /// Position of a quantity in a record.
     fn offset(&self, quantity: Quantity) -> Option<usize> {
         let place = self.quantities.iter().position(|q| *q == quantity)?;
         Some(self.quantities[..place].iter().map(|q| q.width()).sum())
     }
 
-    /// Mean of a quantity in every pixel; `None` where it is not measured.
+    /// The mean of a quantity in every pixel. `None` if the film does not hold this quantity.
     pub fn mean(&self, quantity: Quantity) -> Option<Vec<Vec3>> {
         let offset = self.offset(quantity)?;
         Some(self.column(offset).map(|mean| mean.as_vec3()).collect())
     }
 
-    /// Variance of the pixels' means, per channel; `None` without two blocks.
+    /// The variance of each pixel's mean, per channel. `None` for fewer than two blocks and for quantities without
+    /// scatter.
     pub fn variance(&self, quantity: Quantity) -> Option<Vec<Vec3>> {
         let offset = self.offset(quantity).filter(|_| quantity.has_scatter() && self.blocks >= 2)?;
         let n = f64::from(self.blocks);
         Some(self.column(offset + 3).map(|scatter| (scatter / (n * (n - 1.0))).as_vec3()).collect())
     }
 
-    /// How noisy a quantity is, over pixels and channels; `None` without two blocks.
-    pub fn noise(&self, quantity: Quantity) -> Option<Noise> {
+    /// The noise of a quantity, averaged over pixels and channels. `None` as for [`Film::variance`].
+    pub fn noise(&self, quantity: Quantity) -> Option<NoiseLevel> {
         let offset = self.offset(quantity).filter(|_| quantity.has_scatter() && self.blocks >= 2)?;
         let n = f64::from(self.blocks);
         let channels = (3 * self.values.len() / self.stride()) as f64;
@@ -118,14 +122,15 @@ impl Film {
             error += variance.to_array().map(f64::sqrt).iter().sum::<f64>();
             squared += variance.element_sum();
         }
-        Some(Noise {
+        Some(NoiseLevel {
             mean: mean / channels,
             mean_standard_error: error / channels,
             rms_standard_error: (squared / channels).sqrt(),
         })
     }
 
-    /// Stores the exact state as words: `quantity_mean_r_high` and so on, the two halves of each number's bits.
+    /// Stores the exact state as words. The bits of each number become two words, for example `beauty_mean_r_high` and
+    /// `beauty_mean_r_low`.
     pub fn store(&self, image: &mut LayeredImage) {
         let stride = self.stride();
         for (place, name) in self.names().enumerate() {
@@ -135,7 +140,7 @@ impl Film {
         }
     }
 
-    /// Undoes [`Film::store`]; `None` where words are missing or numbers are not finite.
+    /// Undoes [`Film::store`]. `None` if words are missing or numbers are not finite.
     pub fn restore(quantities: &'static [Quantity], image: &LayeredImage, blocks: u32) -> Option<Film> {
         let mut film = Film::new(quantities, image.width as usize * image.height as usize);
         let stride = film.stride();
@@ -151,7 +156,7 @@ impl Film {
         film.values.iter().all(|v| v.is_finite()).then_some(film)
     }
 
-    /// One name for every number of a record.
+    /// The names of the numbers in a record, in order.
     fn names(&self) -> impl Iterator<Item = String> + use<> {
         let moments = |q: Quantity| if q.has_scatter() { &["mean", "scatter"][..] } else { &["mean"] };
         let channels = move |q: Quantity| {
@@ -161,18 +166,19 @@ impl Film {
     }
 }
 
-/// Noise of a picture, in the unit of what it shows.
+/// The noise of a whole picture, in the unit of the quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Noise {
-    /// Mean over pixels and channels of the quantity itself.
+pub struct NoiseLevel {
+    /// Mean of the quantity over pixels and channels.
     pub mean: f64,
-    /// Mean over pixels and channels of the standard error.
+    /// Mean of the standard error over pixels and channels.
     pub mean_standard_error: f64,
-    /// Root of the mean variance: the RMSE that the noise alone makes.
+    /// Root of the mean variance. This is the RMSE that noise alone causes.
     pub rms_standard_error: f64,
 }
 
-/// Adds a block's means, one for each of `quantities`, to a pixel's record that holds `blocks` of them.
+/// Adds a block to a pixel's record. `means` holds the block's mean of each of `quantities`; `blocks` is the number of
+/// blocks that the record contains before.
 #[inline]
 pub fn add_block(record: &mut [f64], quantities: &[Quantity], means: &[DVec3], blocks: u32) {
     let n = f64::from(blocks + 1);

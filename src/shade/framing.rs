@@ -1,4 +1,4 @@
-//! A camera for scenes that bring none.
+//! An automatic camera for scenes without cameras.
 
 use glam::Vec3;
 
@@ -8,22 +8,25 @@ use crate::math::fibonacci;
 use crate::scene::Camera;
 use crate::trace::Ray;
 
-/// Vertical field of view of framed cameras.
+/// Vertical field of view of automatic cameras.
 const FOV_Y_DEG: f32 = 60.0;
 
-/// Directions tried around a candidate viewpoint.
+/// Number of directions in which a candidate viewpoint is examined.
 const DIRECTIONS: usize = 256;
 
-/// Candidates along each axis of the scene's box.
+/// Number of candidate viewpoints along each axis of the scene's box.
 const CANDIDATES: u32 = 5;
 
-/// Share of the rays from a point that must meet the front of something for the point to count as indoors.
+/// A point is enclosed if at least this share of the rays from it hit the front of a surface.
 const ENCLOSED_SHARE: f32 = 0.9;
 
-/// Views from outside stand this many radii of the scene's bounding sphere from its centre, so that it fits the picture.
+/// Distance of a view from outside to the scene's centre, in radii of its bounding sphere. The scene then fits the
+/// picture.
 const OUTSIDE_RADII: f32 = 2.0;
 
-/// Frames a scene: from its most open place, looking along its longest view, when it is enclosed; else from outside.
+/// Chooses a camera, and tells whether it stands inside the scene. If points of the scene are enclosed and see light,
+/// the camera stands at the one with the most space around it and looks along its longest view. Otherwise it looks at
+/// the scene from outside.
 pub fn frame(world: &World, bounds: (Vec3, Vec3)) -> (Camera, bool) {
     let (low, high) = bounds;
     let fov = FOV_Y_DEG.to_radians();
@@ -37,10 +40,10 @@ pub fn frame(world: &World, bounds: (Vec3, Vec3)) -> (Camera, bool) {
         let position = candidate(i);
         let (clearance, farthest, fronts, lit) = look_around(world, position);
         let enclosed = fronts as f32 >= ENCLOSED_SHARE * DIRECTIONS as f32;
-        // Inside a solid block it is enclosed too, but no light is to be seen there.
+        // A point inside a solid block is enclosed too, but it sees no light.
         (enclosed && (lit || dark)).then_some((clearance, position, farthest))
     });
-    // The first of the widest, so that the choice does not depend on rounding elsewhere.
+    // Of equal candidates the first is taken, so that the choice is deterministic.
     let best = inside.fold(None, |best: Option<(f32, Vec3, Vec3)>, c| match best {
         Some(b) if b.0 >= c.0 => Some(b),
         _ => Some(c),
@@ -55,8 +58,8 @@ pub fn frame(world: &World, bounds: (Vec3, Vec3)) -> (Camera, bool) {
     }
 }
 
-/// Distance to the nearest surface, direction of the longest view that is not steep, number of rays that meet fronts,
-/// and whether any light can be seen.
+/// Examines a viewpoint: the distance to the nearest surface, the direction of the longest nearly horizontal view, the
+/// number of rays that hit fronts of surfaces, and whether any light is visible.
 fn look_around(world: &World, position: Vec3) -> (f32, Vec3, usize, bool) {
     let (mut nearest, mut farthest, mut direction, mut fronts) = (f32::INFINITY, 0.0, Vec3::NEG_Z, 0);
     let mut lit =
@@ -73,7 +76,7 @@ fn look_around(world: &World, position: Vec3) -> (f32, Vec3, usize, bool) {
         fronts += usize::from(!surface.is_back());
         let t = surface.hit.t;
         nearest = nearest.min(t);
-        // Views within 20° of the horizontal.
+        // 0.34 is the sine of 20°: only nearly horizontal views count.
         if t > farthest && d.y.abs() < 0.34 {
             (farthest, direction) = (t, d);
         }

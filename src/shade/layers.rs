@@ -1,4 +1,4 @@
-//! Layers of a picture from its points.
+//! The layers of a picture, from its points.
 
 use glam::Vec3;
 
@@ -6,13 +6,13 @@ use super::points::{ImagePoint, View};
 use crate::image::LayeredImage;
 use crate::light::lambert::reflected_radiance;
 
-/// Radiance towards the viewer, W·m⁻²·sr⁻¹: emitted, and reflected from direct and indirect light.
+/// Radiance towards the viewer, W·m⁻²·sr⁻¹: emission, and reflection of direct and indirect light.
 pub fn beauty(point: &ImagePoint, irradiance_indirect: Vec3) -> Vec3 {
     let surface = &point.surface;
     surface.emission + reflected_radiance(surface.albedo, point.irradiance_direct + irradiance_indirect)
 }
 
-/// Sums a value of every point into pixels.
+/// The pixels of a layer: each is the sum of `value` over its points, weighted by their shares of the pixel.
 pub fn to_pixels(view: &View, value: impl Fn(usize, &ImagePoint) -> Vec3) -> Vec<Vec3> {
     let mut pixels = vec![Vec3::ZERO; view.width as usize * view.height as usize];
     for (i, point) in view.points.iter().enumerate() {
@@ -21,7 +21,7 @@ pub fn to_pixels(view: &View, value: impl Fn(usize, &ImagePoint) -> Vec3) -> Vec
     pixels
 }
 
-/// All layers of one method's picture; `indirect` is the irradiance from probes at every point.
+/// All layers of a picture. `indirect` is the indirect irradiance at every point, W·m⁻².
 pub fn compose(view: &View, indirect: &[Vec3]) -> LayeredImage {
     let mut image = LayeredImage::new(view.width, view.height);
     let with_sky = |mut pixels: Vec<Vec3>| {

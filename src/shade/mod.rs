@@ -1,13 +1,14 @@
-//! Cameras to pictures: what is seen, how probes light it, and the layers that come of it.
+//! From cameras to pictures: which points a camera sees, how probes or paths light them, and the layers of the result.
 
 mod develop;
 pub mod film;
 pub mod framing;
 pub mod layers;
-pub mod methods;
+
 pub mod outlook;
 pub mod points;
 pub mod reference;
 pub mod reference_file;
 pub mod regions;
 pub mod spheres;
+pub mod visibility_modes;

@@ -1,22 +1,24 @@
-//! What a camera shows, from a few of its pixels: too much for memory, nothing, or the inside of a wall.
+//! A quick check of a camera from a few of its pixels. It predicts the memory of the picture, and it finds cameras that
+//! see nothing or stand inside a wall.
 
 use super::points::{View, see};
 use crate::light::World;
 use crate::scene::Camera;
 
-/// Pixels along the longer side of the picture that is looked at first.
+/// Pixels along the longer side of the small picture.
 const SIDE: u32 = 64;
 
-/// Share of the points that may be backs of surfaces before the camera is taken to be inside geometry. Beside a sheet
-/// that has only a front about half of them are.
+/// The camera seems to stand inside geometry if more than this share of its points are backs of surfaces. A camera
+/// beside a single-sided sheet sees about half of the points as backs.
 const BACK_SHARE: f32 = 0.5;
 
-/// A camera's picture in small.
+/// Figures of a camera's small picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outlook {
-    /// Points per pixel: 0 where only sky is seen, above 1 where translucent surfaces overlap.
+    /// Mean number of points per pixel. It is 0 if only sky is visible, and can exceed 1 if translucent surfaces
+    /// overlap.
     pub points_per_pixel: f32,
-    /// Of the points, how many show the back of a surface that has one.
+    /// Share of the points that are backs of single-sided surfaces.
     pub back_share: f32,
 }
 
@@ -36,7 +38,7 @@ impl Outlook {
         }
     }
 
-    /// What a user should know about the camera.
+    /// A warning to the user about the camera.
     pub fn warning(&self) -> Option<String> {
         if self.points_per_pixel == 0.0 {
             return Some("it sees no surface".to_owned());

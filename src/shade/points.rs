@@ -1,4 +1,4 @@
-//! Primary visibility: the surface points that a picture's pixels show.
+//! Primary visibility: the surface points that the pixels of a picture show.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -11,21 +11,21 @@ use crate::probe::store::surface::Facing;
 use crate::scene::{AlphaMode, Camera};
 use crate::trace::Ray;
 
-/// Rays per pixel where the scene has BLEND surfaces, which stop rays by chance.
+/// Rays per pixel in scenes with BLEND surfaces, which stop rays by chance.
 const BLEND_SAMPLES: u32 = 16;
 
 /// A surface point in a picture. A pixel has one, or several where translucent surfaces overlap.
 #[derive(Debug, Clone, Copy)]
 pub struct ImagePoint {
     pub pixel: u32,
-    /// Share of the pixel.
+    /// Share of the pixel that shows this point.
     pub weight: f32,
     pub surface: SurfacePoint,
-    /// The surface's shading normal bent by its normal map, unit, on the viewer's side.
+    /// Unit shading normal after the normal map, on the viewer's side.
     pub normal: Vec3,
     /// Unit, towards the viewer.
     pub view: Vec3,
-    /// From the camera, metres.
+    /// Distance from the camera, metres.
     pub depth: f32,
     /// Irradiance from punctual lights, W·m⁻².
     pub irradiance_direct: Vec3,
@@ -48,7 +48,7 @@ pub struct View {
     pub width: u32,
     pub height: u32,
     pub points: Vec<ImagePoint>,
-    /// Per pixel: radiance of the sky where rays leave the scene, W·m⁻²·sr⁻¹.
+    /// Per pixel the radiance of the sky × the share of its rays that leave the scene, W·m⁻²·sr⁻¹.
     pub sky: Vec<Vec3>,
 }
 
@@ -64,13 +64,13 @@ pub fn see(world: &World, camera: &Camera, width: u32, height: u32, seed: u64) -
     View { width, height, points: found.into_iter().flat_map(|f| f.0).collect(), sky }
 }
 
-/// Whether rays meet surfaces by chance.
+/// Whether the scene has BLEND surfaces, which stop rays by chance.
 pub fn has_blend(world: &World) -> bool {
     world.scene.materials.iter().any(|m| m.alpha_mode == AlphaMode::Blend)
 }
 
-/// The points that `samples` rays through the centre of pixel `index` meet, each weighted by its share of the rays, and
-/// the radiance of the sky behind the rest.
+/// The points that `samples` rays through the centre of pixel `index` hit, each weighted by its share of the rays; and
+/// the radiance of the sky × the share of rays that leave the scene.
 pub fn see_pixel(
     world: &World,
     camera: &Camera,
@@ -104,7 +104,8 @@ pub fn see_pixel(
 }
 
 impl World<'_> {
-    /// The shading normal after the normal map, on the viewer's side; unbent where the map turns it away from there.
+    /// The shading normal after the normal map, on the viewer's side. If the map would turn it away from the viewer's
+    /// side, the shading normal without the map.
     fn bent_normal(&self, surface: &SurfacePoint) -> Vec3 {
         let side = if surface.front { 1.0 } else { -1.0 };
         let front_normal = surface.shading_normal * side;

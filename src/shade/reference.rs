@@ -1,19 +1,19 @@
-//! The reference picture: path-traced light in the layers of every other picture, with its variance.
+//! The reference picture: path-traced light in the same layers as every other picture, and its variance.
 //!
-//! Samples come in blocks of sixteen ([`crate::math::blocks`]), so their number is rounded up to whole blocks; fewer than
-//! sixteen are a part of one block, which has a picture but no variance and cannot be continued. Each pass adds one
-//! block to every pixel.
+//! Samples come in blocks of sixteen ([`crate::math::blocks`]), so their number is rounded up to whole blocks. Each
+//! pass adds one block to every pixel. Fewer than sixteen samples are a partial block: it gives a picture but no
+//! variance, and it cannot be continued.
 //!
-//! Where no surface is translucent a pixel shows one point, and what it emits and what punctual lights send it straight
-//! are exact: only light that probes would hold is sampled. With BLEND surfaces every block shoots the pixel's rays
-//! anew, and all layers are averages.
+//! In scenes without BLEND surfaces a pixel shows one point. Its emission and its direct light from punctual lights are
+//! then exact, and only the light that probes would store is sampled. With BLEND surfaces every block traces new rays
+//! through the pixel, and all layers are averages.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 pub use super::develop::{BEAUTY_VARIANCE, IRRADIANCE_INDIRECT_VARIANCE};
 use super::develop::{FixedView, NO_POINT, develop_blended, develop_fixed, direct_radiance, quantities};
-use super::film::{Film, Noise, Quantity, add_block};
+use super::film::{Film, NoiseLevel, Quantity, add_block};
 use super::points::{ImagePoint, has_blend, see, see_pixel};
 use crate::image::LayeredImage;
 use crate::light::World;
@@ -25,15 +25,15 @@ use crate::math::random::{Purpose, Random};
 use crate::scene::Camera;
 use crate::system::progress::Progress;
 
-/// Number of all quantities.
+/// Number of the variants of [`Quantity`].
 const MOST: usize = Quantity::Depth as usize + 1;
 
-/// Pixels that a thread takes at a time: some milliseconds of work.
+/// Pixels per task of a thread. They take some milliseconds.
 const RUN: usize = 32;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReferenceSettings {
-    /// Samples per pixel in all, rounded up to whole blocks of [`BLOCK`] from there on.
+    /// Samples per pixel. From [`BLOCK`] on they are rounded up to whole blocks.
     pub spp: u32,
     pub seed: u64,
     pub transport: Transport,
@@ -72,69 +72,70 @@ impl ReferenceSettings {
         if self.spp < BLOCK { self.spp } else { self.spp.div_ceil(BLOCK).saturating_mul(BLOCK) }
     }
 
-    /// Whole blocks that will be taken; 0 for a part of one.
+    /// Whole blocks that will be taken. 0 for a partial block.
     fn blocks(&self) -> u32 {
         self.rounded_spp() / BLOCK
     }
 }
 
-/// What another run needs to go on: whole blocks only.
+/// The data that another run needs to continue this one. It contains whole blocks only.
 #[derive(Debug, Clone, PartialEq)]
 pub struct State {
     pub film: Film,
-    /// Samples that were not finite and count as 0.
+    /// Number of samples that were not finite. They count as 0.
     pub non_finite: u64,
-    /// Along paths (`primary`) and towards lights (`shadow`); those that found the picture's points are not in it.
+    /// Rays along paths (`primary`) and towards lights (`shadow`), without the camera rays.
     pub rays: RayCount,
 }
 
 /// A finished picture.
 #[derive(Debug, Clone)]
 pub struct Reference {
-    /// The layers of all pictures; from two blocks on also `beauty_variance` and `irradiance_indirect_variance`, the
-    /// variance of each pixel's mean.
+    /// The same layers as all pictures. From two blocks on there are also `beauty_variance` and
+    /// `irradiance_indirect_variance`, the variances of each pixel's mean.
     pub image: LayeredImage,
     /// Samples per pixel.
     pub spp: u32,
-    /// Samples that were not finite and count as 0.
+    /// As [`State::non_finite`].
     pub non_finite: u64,
     /// As [`State::rays`].
     pub rays: RayCount,
-    /// Of `irradiance_indirect`, from two blocks on.
-    pub noise: Option<Noise>,
-    /// `None` for a part of a block.
+    /// Noise of `irradiance_indirect`. `None` below two blocks.
+    pub noise: Option<NoiseLevel>,
+    /// `None` for a partial block.
     pub state: Option<State>,
 }
 
 impl Reference {
-    /// W·m⁻², per pixel.
+    /// Indirect irradiance per pixel, W·m⁻².
     pub fn irradiance_indirect(&self) -> &[Vec3] {
         self.layer(Quantity::IrradianceIndirect.name())
     }
 
-    /// Variance of each pixel's mean, per channel, (W·m⁻²)²; `None` below two blocks: then it is not known.
+    /// Variance of each pixel's mean indirect irradiance, per channel, (W·m⁻²)². `None` below two blocks, because a
+    /// single block has no spread.
     pub fn irradiance_indirect_variance(&self) -> Option<&[Vec3]> {
         self.image.layer(IRRADIANCE_INDIRECT_VARIANCE)
     }
 
-    /// Radiance, W·m⁻²·sr⁻¹, per pixel.
+    /// Radiance per pixel, W·m⁻²·sr⁻¹.
     pub fn beauty(&self) -> &[Vec3] {
         self.layer(Quantity::Beauty.name())
     }
 
-    /// As [`Self::irradiance_indirect_variance`], of [`Self::beauty`].
+    /// Variance of each pixel's [`Self::beauty`], per channel. `None` below two blocks.
     pub fn beauty_variance(&self) -> Option<&[Vec3]> {
         self.image.layer(BEAUTY_VARIANCE)
     }
 
-    /// Empty only in files that were not written by [`Self::write`].
+    /// The pixels of a layer. Empty if a file that [`Self::write`] did not write lacks the layer.
     fn layer(&self, name: &str) -> &[Vec3] {
         self.image.layer(name).unwrap_or(&[])
     }
 }
 
-/// Traces a reference to its end. `previous` is the state of an earlier run of the same world, camera, size and settings
-/// but for `spp`: the result is that of one run.
+/// Traces a reference until it has all its samples. `previous` is the state of an earlier run with the same world,
+/// camera, size and settings; only `spp` may differ. The result then equals that of one uninterrupted run.
 pub fn trace(
     world: &World,
     camera: &Camera,
@@ -157,24 +158,24 @@ pub fn trace(
     tracing.develop()
 }
 
-impl Noise {
-    /// For progress bars.
+impl NoiseLevel {
+    /// The text for progress bars.
     pub fn to_message(&self) -> String {
         format!("noise {:.3} %", 100.0 * self.mean_standard_error / self.mean.max(f64::MIN_POSITIVE))
     }
 }
 
-/// A reference in the making, a block at a time.
+/// A reference that is being traced, one block at a time.
 pub struct Tracing<'a> {
     world: &'a World<'a>,
     camera: &'a Camera,
     width: u32,
     height: u32,
     settings: ReferenceSettings,
-    /// What the pixels show, where that does not change from block to block.
+    /// The points of the pixels. `None` if they change from block to block.
     view: Option<FixedView>,
     state: State,
-    /// Whether the part of a block that was asked for is done.
+    /// Whether the partial block is done, if one was asked for.
     part_done: bool,
 }
 
@@ -205,7 +206,7 @@ impl<'a> Tracing<'a> {
         Tracing { world, camera, width, height, settings: *settings, view, state, part_done: false }
     }
 
-    /// Passes still to go.
+    /// Number of passes left.
     pub fn remaining(&self) -> u32 {
         if self.is_part() {
             u32::from(!self.part_done)
@@ -214,7 +215,7 @@ impl<'a> Tracing<'a> {
         }
     }
 
-    /// Whether less than a block is asked for, and there is none yet.
+    /// Whether the result is a partial block: less than a block is asked for, and no whole block exists.
     fn is_part(&self) -> bool {
         self.settings.blocks() == 0 && (self.part_done || self.state.film.blocks == 0)
     }
@@ -246,7 +247,7 @@ impl<'a> Tracing<'a> {
         self.part_done = samples < BLOCK;
     }
 
-    /// One block of one pixel: means of all quantities, in the order of [`Quantity`].
+    /// One block of one pixel: the means of all quantities, in the order of [`Quantity`].
     fn block(&self, pixel: u32, block: u32, samples: u32, counts: &mut Counts) -> [DVec3; MOST] {
         let mut means = [DVec3::ZERO; MOST];
         match &self.view {
@@ -276,7 +277,7 @@ impl<'a> Tracing<'a> {
         means
     }
 
-    /// Adds the indirect light at a pixel's points.
+    /// Adds one block of samples of the indirect light at a pixel's points.
     fn add_points(
         &self,
         points: &[ImagePoint],
@@ -290,7 +291,7 @@ impl<'a> Tracing<'a> {
         let block = Block::new(self.settings.seed, Purpose::Path, u64::from(pixel), u64::from(block));
         let mut index = 0;
         for point in points {
-            // Weights are multiples of 1/samples: every ray that met the point sends out a path.
+            // Weights are multiples of 1/samples. Each ray that hit the point starts one path there.
             let share = (point.weight * samples as f32).round() as u32;
             for _ in 0..share {
                 let mut numbers = block.sample(index);
@@ -311,7 +312,7 @@ impl<'a> Tracing<'a> {
         }
     }
 
-    /// Adds what is known of a point without paths.
+    /// Adds the quantities of a point that need no paths.
     fn add_seen(&self, point: &ImagePoint, salt: u32, means: &mut [DVec3; MOST]) {
         let mut add = |quantity: Quantity, value: Vec3| means[quantity as usize] += (value * point.weight).as_dvec3();
         add(Quantity::Emission, point.surface.emission);
@@ -322,12 +323,12 @@ impl<'a> Tracing<'a> {
         add(Quantity::Depth, Vec3::splat(point.depth));
     }
 
-    /// Of `irradiance_indirect`; `None` below two blocks.
-    pub fn noise(&self) -> Option<Noise> {
+    /// Noise of `irradiance_indirect` so far. `None` below two blocks.
+    pub fn noise(&self) -> Option<NoiseLevel> {
         self.state.film.noise(Quantity::IrradianceIndirect)
     }
 
-    /// The picture as it is now.
+    /// The picture from the samples so far.
     pub fn develop(&self) -> Reference {
         let film = &self.state.film;
         let image = match &self.view {
@@ -345,7 +346,7 @@ impl<'a> Tracing<'a> {
     }
 }
 
-/// What a thread counts.
+/// The counts of one task.
 #[derive(Debug, Clone, Copy, Default)]
 struct Counts {
     rays: RayCount,

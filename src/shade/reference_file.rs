@@ -1,12 +1,13 @@
-//! References on disk: an EXR of their layers that also carries what they are of and what is needed to go on.
+//! References on disk. A reference is an EXR file with the layers of the picture, a description of what it shows, and
+//! the state that a later run needs to continue it.
 //!
-//! Beside the layers stand the texts of [`Identity`], `spp`, `non_finite`, `rays_*` and `noise_*` (the attribute
-//! `lightprobe`, JSON), and the state of the film as words (channels `state.*`, whole numbers; [`Film::store`]).
+//! The description is the JSON attribute `lightprobe`. It holds the texts of [`Identity`], `spp`, `non_finite`,
+//! `rays_*` and `noise_*`. The state is stored as words in the channels `state.*` ([`Film::store`]).
 
 use std::path::{Path, PathBuf};
 
 use super::develop::quantities;
-use super::film::{Film, Noise};
+use super::film::{Film, NoiseLevel};
 use super::reference::{Reference, ReferenceSettings, State};
 use crate::image::{ImageError, LayeredImage};
 use crate::light::World;
@@ -14,7 +15,7 @@ use crate::light::sampled::RayCount;
 use crate::math::blocks::BLOCK;
 use crate::scene::Camera;
 
-/// Of the layout of the file and of the estimator: another version's samples cannot be continued.
+/// Version of the file's layout and of the estimator. Samples of another version cannot be continued.
 const FORMAT: &str = "lightprobe-reference/1";
 
 #[derive(Debug, thiserror::Error)]
@@ -26,7 +27,7 @@ pub enum ReferenceError {
     )]
     NotAReference { path: PathBuf, what: String },
     #[error(
-        "cannot continue {path}: its {what} is {found}, now it is {wanted}; give the arguments that it was made with or \
+        "cannot continue {path}: it was made with the {what} {found}, but this run has {wanted}; give the same arguments or \
          write to another file"
     )]
     Different { path: PathBuf, what: String, found: String, wanted: String },
@@ -34,14 +35,15 @@ pub enum ReferenceError {
     NoState { path: PathBuf },
 }
 
-/// All that a reference's samples depend on, by name; what explains most comes first.
+/// Everything that the samples of a reference depend on, as pairs of name and text. If two identities differ, the first
+/// difference is reported, so the entries that explain most come first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identity(Vec<(&'static str, String)>);
 
 impl Identity {
     pub fn new(world: &World, camera: &Camera, width: u32, height: u32, settings: &ReferenceSettings) -> Identity {
         let optional = |x: Option<String>| x.unwrap_or_else(|| "none".to_owned());
-        // Shortest texts that read back to the same number: equal texts are equal numbers.
+        // Rust prints the shortest text that reads back to the same number, so equal texts mean equal numbers.
         let camera_numbers = format!("{:?} {:?} {:?}", camera.position, camera.world_from_camera, camera.projection);
         Identity(vec![
             ("format", FORMAT.to_owned()),
@@ -61,18 +63,18 @@ impl Identity {
 }
 
 impl Identity {
-    /// All of it as text: equal texts are equal identities.
+    /// The identity as one text. Equal texts mean equal identities.
     pub fn to_text(&self) -> String {
         self.0.iter().map(|(name, value)| format!("{name} = {value}\n")).collect()
     }
 }
 
-/// What of an [`Identity`] says which picture it is; the rest says how it was made.
+/// The entries of an [`Identity`] that say which picture it is. The other entries say how it was made.
 const PICTURE: &[&str] = &["scene_blake3", "punctual_scale", "albedo_max", "camera_view", "size"];
 
 impl Identity {
-    /// What makes a picture from a file another than this one, of the scene, camera and size; `None` where it is the same, or
-    /// its file does not say.
+    /// Compares with a picture from a file. Returns in words the first difference of scene, camera or size, or `None`
+    /// if they agree. Entries that the file lacks are not compared.
     pub fn other_picture(&self, image: &LayeredImage) -> Option<String> {
         let differs = |(name, wanted): &&(&'static str, String)| {
             PICTURE.contains(name) && image.texts.get(*name).is_some_and(|found| found != wanted)
@@ -81,7 +83,7 @@ impl Identity {
     }
 }
 
-/// A part of an identity in words.
+/// The name of an identity's entry in words.
 fn describe(name: &str) -> String {
     match name {
         "scene_blake3" => "scene (its files or its sky)".to_owned(),
@@ -90,7 +92,7 @@ fn describe(name: &str) -> String {
 }
 
 impl Reference {
-    /// Writes the picture with what [`Reference::read`] and [`resume`] need.
+    /// Writes the picture with all that [`Reference::read`] and [`resume`] need.
     ///
     /// # Errors
     /// Those of [`LayeredImage::write_exr`].
@@ -115,10 +117,10 @@ impl Reference {
         Ok(image.write_exr(path)?)
     }
 
-    /// Reads a reference to compare with: its layers and what is known of them, without the state.
+    /// Reads a reference for comparison: its layers and its description, without the state.
     ///
     /// # Errors
-    /// Files that cannot be read or were not written by [`Reference::write`].
+    /// The file cannot be read, or [`Reference::write`] did not write it.
     pub fn read(path: &Path) -> Result<Reference, ReferenceError> {
         let image = LayeredImage::read_exr(path)?;
         let lacks = |what: &str| ReferenceError::NotAReference { path: path.to_owned(), what: what.to_owned() };
@@ -134,7 +136,7 @@ impl Reference {
         let required = |name: &str| number(name).ok_or_else(|| lacks(&format!("the text '{name}'")));
         let real = |name: &str| -> Option<f64> { image.texts.get(name)?.parse().ok().filter(|x: &f64| x.is_finite()) };
         let noise = || {
-            Some(Noise {
+            Some(NoiseLevel {
                 mean: real("noise_mean")?,
                 mean_standard_error: real("noise_mean_standard_error")?,
                 rms_standard_error: real("noise_rms_standard_error")?,
@@ -151,10 +153,10 @@ impl Reference {
     }
 }
 
-/// Reads what a run of this identity left behind, to go on from there. `None` where it is less than a block.
+/// Reads the state of an earlier run with this identity. `None` if that run has less than one block.
 ///
 /// # Errors
-/// Those of [`Reference::read`], another identity, and a damaged state.
+/// Those of [`Reference::read`]; the file has another identity, or its state is damaged.
 pub fn resume(
     path: &Path,
     identity: &Identity,

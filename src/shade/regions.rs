@@ -1,4 +1,4 @@
-//! Which pixels show corners and which flat parts: where interpolation between probes is hard and where it is easy.
+//! Division of a picture's pixels into corners and flat parts. Interpolation between probes is harder in corners.
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -8,30 +8,30 @@ use crate::light::World;
 use crate::math::sampling::cosine_hemisphere;
 use crate::trace::Ray;
 
-/// Rays that decide about a point.
+/// Number of rays from a point that decide whether it lies in a corner.
 const RAYS: u32 = 64;
 
-/// Of these so many must hit something near for the point to lie in a corner: a quarter.
+/// A point lies in a corner if at least this many of its rays hit a near surface. It is a quarter of [`RAYS`].
 const CORNER_RAYS: usize = 16;
 
-/// What counts as near, as a share of the scene's diagonal.
+/// Distance within which a surface is near, as a share of the scene's diagonal.
 const NEAR_SHARE: f32 = 0.02;
 
-/// Where a pixel's surface lies.
+/// The region of a pixel's surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Region {
     /// At least 25 % of 64 fixed cosine-distributed rays hit something within 2 % of the scene's diagonal.
     Corner,
-    /// Anywhere else.
+    /// All other surfaces.
     Flat,
 }
 
-/// The region of every pixel, row 0 at the top; `None` where it shows no surface. Where a pixel shows several surfaces, the region
-/// that most of it shows.
+/// The region of every pixel, row 0 at the top. `None` for pixels without a surface. A pixel with several surfaces gets
+/// the region of the larger share.
 pub fn regions(world: &World, view: &View) -> Vec<Option<Region>> {
     let reach = NEAR_SHARE * world.scene.mesh.bounds().map_or(0.0, |(low, high)| high.distance(low));
     let corners: Vec<bool> = view.points.par_iter().map(|point| is_corner(world, point, reach)).collect();
-    // Share of the pixel that lies in corners minus the share that does not.
+    // Per pixel the share in corners minus the share in flat parts.
     let mut balance: Vec<Option<f32>> = vec![None; view.width as usize * view.height as usize];
     for (point, corner) in view.points.iter().zip(corners) {
         let share = if corner { point.weight } else { -point.weight };
@@ -41,7 +41,8 @@ pub fn regions(world: &World, view: &View) -> Vec<Option<Region>> {
     balance.into_iter().map(|b| b.map(region)).collect()
 }
 
-/// Around the geometric normal: the question is about shapes, not about shading.
+/// Whether a point lies in a corner. The rays are distributed about the geometric normal, because a corner is a
+/// property of the shape and not of the shading.
 fn is_corner(world: &World, point: &ImagePoint, reach: f32) -> bool {
     let origin = point.surface.ray_origin();
     let near = |i: &u32| {
@@ -51,10 +52,10 @@ fn is_corner(world: &World, point: &ImagePoint, reach: f32) -> bool {
     (0..RAYS).filter(near).count() >= CORNER_RAYS
 }
 
-/// Point `i` of the Hammersley set of `count` points in the unit square (J. M. Hammersley 1960), its first coordinate
-/// shifted to the middle of the strata.
+/// Point `i` of the Hammersley set of `count` points in the unit square (J. M. Hammersley 1960). Its first coordinate
+/// is shifted to the middle of its stratum.
 fn hammersley(i: u32, count: u32) -> Vec2 {
-    // 2⁻³² times the reversed bits: the radical inverse in base 2.
+    // The radical inverse in base 2 is 2⁻³² × the reversed bits.
     let inverse = f64::from(i.reverse_bits()) / (1u64 << 32) as f64;
     Vec2::new((i as f32 + 0.5) / count as f32, inverse as f32)
 }

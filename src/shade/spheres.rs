@@ -1,4 +1,5 @@
-//! The probes as small spheres in the picture: shaded by their own irradiance, or coloured by why they are not baked.
+//! The probes as small spheres in a picture. Baked probes are shaded by their own irradiance; the colour of the others
+//! tells why they are not baked.
 
 use glam::{Vec2, Vec3};
 
@@ -9,21 +10,25 @@ use crate::probe::{ProbeIndex, Volume};
 use crate::scene::Camera;
 use crate::scene::camera::Projection;
 
-/// Radius of the spheres, in spacings.
+/// Radius of the spheres, as a share of the smallest grid spacing.
 const RADIUS: f32 = 0.08;
 
-/// sRGB colours of probes inside geometry and of those that no surface samples.
+/// sRGB colour of probes inside geometry.
 pub const INSIDE_COLOR: [u8; 3] = [214, 48, 49];
+
+/// sRGB colour of probes that no surface samples.
 pub const UNSAMPLED_COLOR: [u8; 3] = [9, 132, 227];
 
-/// Around every sphere, so that one in the dark stands out from the dark behind it.
+/// sRGB colour of the rim around every sphere. The rim keeps dark spheres visible in front of a dark background.
 pub const RIM_COLOR: [u8; 3] = [200, 204, 208];
 
-/// Width of the rim in pixels, as far as the sphere is wide enough; at most this share of its radius.
+/// Width of the rim, pixels.
 const RIM_PX: f32 = 1.2;
+
+/// Largest width of the rim as a share of the sphere's radius.
 const RIM_SHARE: f32 = 0.25;
 
-/// Draws the probes over a picture of the scene. Probes hidden behind surfaces stay hidden.
+/// Draws the probes over a picture of the scene. Surfaces hide the probes behind them.
 pub fn draw(scene_picture: &Picture8, view: &View, camera: &Camera, volume: &Volume, exposure_ev: f32) -> Picture8 {
     let (width, height) = (view.width, view.height);
     let mut picture = scene_picture.clone();
@@ -45,7 +50,7 @@ pub fn draw(scene_picture: &Picture8, view: &View, camera: &Camera, volume: &Vol
                 if t < depth[pixel] {
                     depth[pixel] = t;
                     let normal = (origin + direction * t - centre) / radius;
-                    // The sine of the angle to the viewer is the distance from the disc's centre, in radii.
+                    // The sine of the angle between normal and view is the distance from the disc's centre, in radii.
                     let from_centre = normal.cross(direction).length();
                     picture.pixels[pixel] = match from_centre > 1.0 - rim {
                         true => RIM_COLOR,
@@ -77,21 +82,22 @@ fn color(volume: &Volume, probe: usize, normal: Vec3, view: Vec3, exposure_ev: f
     }
 }
 
-/// Where a sphere lies in the picture.
+/// The part of the picture that a sphere may cover.
 struct Disc {
-    /// Pixels that it may cover: up to, but not including, `high`.
+    /// First column and row that the sphere may cover.
     low: (u32, u32),
+    /// Column and row after the last ones that it may cover.
     high: (u32, u32),
-    /// About.
+    /// Approximate radius, pixels.
     radius_px: f32,
 }
 
-/// Where a sphere lies in the picture; `None` behind the camera.
+/// The part of the picture that a sphere may cover. `None` if it lies behind the camera or outside the picture.
 fn disc(camera: &Camera, centre: Vec3, radius: f32, width: u32, height: u32) -> Option<Disc> {
     let in_camera = camera.world_from_camera.transpose() * (centre - camera.position);
     let scale = match camera.projection {
         Projection::Perspective { fov_y_rad } => {
-            // Nearer than this the sphere would enclose the camera or fill the picture.
+            // A sphere nearer than this would enclose the camera or fill the picture.
             let distance = -in_camera.z - radius;
             if distance <= radius {
                 return None;
@@ -115,7 +121,7 @@ fn disc(camera: &Camera, centre: Vec3, radius: f32, width: u32, height: u32) -> 
     })
 }
 
-/// Distance along the unit direction to the front of a sphere.
+/// Distance along the unit `direction` to the front of a sphere. `None` if the ray misses the sphere.
 fn ray_sphere(origin: Vec3, direction: Vec3, centre: Vec3, radius: f32) -> Option<f32> {
     let to_centre = centre - origin;
     let along = to_centre.dot(direction);

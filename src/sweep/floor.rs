@@ -9,7 +9,7 @@ use super::run::{Finished, Setting};
 use crate::bake::BakeError;
 use crate::config::Config;
 use crate::report::sweep::{FloorCause, FloorReport, RunRecord};
-use crate::shade::methods::Method;
+use crate::shade::visibility_modes::VisibilityMode;
 
 /// Bakes and truths that a floor takes at most.
 pub const STEPS: usize = 4;
@@ -57,8 +57,8 @@ fn variants(config: &Config) -> [Variant; 3] {
     ]
 }
 
-fn error_of(record: &RunRecord, method: Method) -> Option<f64> {
-    record.method(method.name())?.error_relative
+fn error_of(record: &RunRecord, mode: VisibilityMode) -> Option<f64> {
+    record.method(mode.name())?.error_relative
 }
 
 /// The shares of a cause without which `remaining` of `all` is left.
@@ -80,7 +80,7 @@ pub fn measure(
     step: &dyn Fn(),
 ) -> Result<FloorReport, SweepError> {
     let seed = base.seed;
-    let all = error_of(base, Method::On);
+    let all = error_of(base, VisibilityMode::On);
     let cause = |cause: &'static str, how: &str, remaining: Option<f64>| FloorCause {
         cause,
         how: how.to_owned(),
@@ -96,7 +96,7 @@ pub fn measure(
         };
         let label = format!("{label} without error of {}", variant.cause);
         causes.push(match setting.obtain(&label, changed, seed, warn) {
-            Ok(Finished { record, .. }) => cause(variant.cause, &variant.how, error_of(&record, Method::On)),
+            Ok(Finished { record, .. }) => cause(variant.cause, &variant.how, error_of(&record, VisibilityMode::On)),
             // It is dearer than what was asked for.
             Err(SweepError::Bake { cause: BakeError::Memory(little), .. }) => {
                 cause(variant.cause, &format!("{}: not measured, {little}", variant.how), None)
@@ -105,7 +105,7 @@ pub fn measure(
         });
         step();
     }
-    let exact = error_of(base, Method::Ray);
+    let exact = error_of(base, VisibilityMode::Ray);
     causes.insert(2, cause("leaks_in_shading", "exact visibility by rays (visibility_ray)", exact));
     let truth = setting.obtain_truth(label, config, seed, warn)?;
     step();

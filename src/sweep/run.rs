@@ -12,8 +12,8 @@ use crate::probe::Volume;
 use crate::probe::file::{self, ProbeFile, SceneRecord};
 use crate::probe::query::Query;
 use crate::report::sweep::{BakeTimes, MethodFigures, RunRecord, TruthRecord};
-use crate::shade::methods::Method;
 use crate::shade::reference::ReferenceSettings;
+use crate::shade::visibility_modes::VisibilityMode;
 use crate::system::progress::Progress;
 
 /// What all runs share.
@@ -64,7 +64,7 @@ impl Setting<'_, '_> {
         let bake = self.bake(label, config, seed)?;
         let shaded = self.shade(config, &bake);
         let record = self.record(seed, &bake, &shaded);
-        let irradiance = shaded[Method::On as usize].irradiance_indirect().to_vec();
+        let irradiance = shaded[VisibilityMode::On as usize].irradiance_indirect().to_vec();
         let view = self.scenery.view;
         self.store.save(&key, &record, Some(Picture::from_pixels(view.width, view.height, irradiance.clone())))?;
         Ok(Finished { record, irradiance, kept: false })

@@ -1,9 +1,9 @@
-//! Numbers as people read them. All are ASCII apart from "µ" and the dash for what is undefined.
+//! Numbers as text for people. All text is ASCII apart from "µ" and the dash for undefined figures.
 
-/// What stands for an undefined figure.
+/// Text of an undefined figure.
 pub const UNDEFINED: &str = "–";
 
-/// Digits that a figure gets in tables: timings and errors are not known better.
+/// Significant digits of a figure in a table. Timings and errors are not known to more.
 const TABLE_DIGITS: usize = 3;
 
 /// A byte count in B, KiB, MiB, GiB or TiB.
@@ -30,7 +30,7 @@ pub fn seconds(seconds: f64) -> String {
     let units = [(1.0e-9, "ns"), (1.0e-6, "µs"), (1.0e-3, "ms")];
     for (scale, unit) in units {
         let value = seconds / scale;
-        // 999.6 ns would else be rounded to 1000 ns.
+        // Rounding must not give "1000 ns".
         if value.abs() < 999.5 {
             return format!("{} {unit}", significant(value, TABLE_DIGITS));
         }
@@ -43,7 +43,8 @@ pub fn percent(share: f64) -> String {
     if share.is_finite() { format!("{} %", significant(100.0 * share, TABLE_DIGITS)) } else { UNDEFINED.to_owned() }
 }
 
-/// A number with this many significant digits (at least 1); powers of ten from 10⁶ on and below 10⁻⁴.
+/// A number with `digits` significant digits (at least 1). Values from 10⁶ up and below 10⁻⁴ are written with an
+/// exponent, such as 1.23e-7.
 pub fn significant(value: f64, digits: usize) -> String {
     if !value.is_finite() {
         return UNDEFINED.to_owned();
@@ -52,7 +53,7 @@ pub fn significant(value: f64, digits: usize) -> String {
         return "0".to_owned();
     }
     let digits = digits.max(1);
-    // Rounded first: 9.996 with three digits is 10.0, which has another exponent.
+    // The exponent is read after rounding, because rounding can change it: 9.996 with three digits is 10.0.
     let rounded = format!("{value:.*e}", digits - 1);
     let exponent: i32 = rounded.rsplit_once('e').and_then(|(_, exponent)| exponent.parse().ok()).unwrap_or(0);
     if (-4..6).contains(&exponent) {
@@ -64,10 +65,10 @@ pub fn significant(value: f64, digits: usize) -> String {
     }
 }
 
-/// A value and its standard error with equal decimals, two digits of the error shown: "12.34 ± 0.12". A value of table digits where
-/// there is no error, or none to be seen beside it.
+/// A value and its standard error, both with as many decimals as give the error two digits: "12.34 ± 0.12". Without a
+/// finite error above 0 the value alone, with the digits of a table.
 pub fn with_error(value: f64, error: Option<f64>) -> String {
-    // Finer errors would only lengthen the value.
+    // A very small error would otherwise give the value a long row of digits.
     const MAX_DIGITS: i32 = 5;
     let plain = significant(value, TABLE_DIGITS);
     let Some(error) = error.filter(|e| e.is_finite() && *e > 0.0).filter(|_| value.is_finite()) else { return plain };
@@ -78,15 +79,15 @@ pub fn with_error(value: f64, error: Option<f64>) -> String {
         return format!("{plain} ± {}", significant(error, 2));
     }
     let decimals = decimals.min(most).max(0) as usize;
-    // What is below the last digit shown is rounded up to it: an error of 0 would be a lie.
+    // An error below the last digit is rounded up to that digit, because "± 0" would claim that the value is exact.
     let error = error.max(10_f64.powi(-(decimals as i32)));
     let value = format!("{value:.decimals$}");
-    // What rounds to 0 has no sign.
+    // "-0.00" loses its sign.
     let is_zero = value.bytes().all(|c| matches!(c, b'-' | b'0' | b'.'));
     format!("{} ± {error:.decimals$}", if is_zero { value.trim_start_matches('-') } else { &value })
 }
 
-/// A count with its thousands set apart by thin gaps: 1234567 gives "1 234 567".
+/// A count with spaces between its thousands: 1234567 gives "1 234 567".
 pub fn count(count: u64) -> String {
     let digits = count.to_string();
     let mut grouped = String::new();
@@ -99,12 +100,12 @@ pub fn count(count: u64) -> String {
     grouped
 }
 
-/// A figure where there is one, else the dash.
+/// The formatted value, or [`UNDEFINED`] for `None`.
 pub fn or_undefined<T>(value: Option<T>, format: impl FnOnce(T) -> String) -> String {
     value.map_or_else(|| UNDEFINED.to_owned(), format)
 }
 
-/// Digits that a value of at least 1 has before its point, so that 1023 is not shortened to 1020.
+/// Digits before the decimal point, at least 1. Callers ask for as many digits, so that 1023 does not become 1020.
 fn digits_before_point(value: f64) -> usize {
     value.abs().max(1.0).log10().floor() as usize + 1
 }
@@ -179,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_counts_and_what_is_undefined() {
+    fn shares_counts_and_undefined_figures() {
         assert_eq!(percent(0.012_34), "1.23 %");
         assert_eq!(percent(f64::NAN), "–");
         assert_eq!(count(1_234_567), "1 234 567");

@@ -1,32 +1,37 @@
-//! How much memory there is, so that a run that cannot succeed is refused instead of killed.
+//! How much memory is available. A run that needs more is refused at its start; otherwise the system would kill it
+//! later.
 
 use std::fs;
 use std::path::Path;
 
 use super::format;
 
-/// A run needs more memory than there is.
+/// A run needs more memory than is available.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{key}: {what} would need about {} of memory, and {} are available; {remedy}", format::bytes(*needed), format::bytes(*available))]
 pub struct TooLittleMemory {
-    /// The flag or key of the configuration that asks for most of it.
+    /// The flag or configuration key that causes most of the need.
     pub key: String,
+    /// What needs the memory, for example "the pictures".
     pub what: &'static str,
+    /// Bytes.
     pub needed: u64,
+    /// Bytes.
     pub available: u64,
     pub remedy: &'static str,
 }
 
-/// Bytes that this process can still take: the least of what the machine has free, of what its control groups leave, and
-/// of its own limit of address space. `None` where the system does not say.
+/// Bytes that this process can still allocate. Three limits count, and the smallest decides: free memory of the
+/// machine, the limits of the process's control groups, and its limit of address space. `None` if the system reports
+/// none of them.
 pub fn available_bytes() -> Option<u64> {
     [machine(), control_groups(), address_space()].into_iter().flatten().min()
 }
 
-/// Refuses what takes more memory than there is; `refusal` says whose doing it is.
+/// Refuses a run that needs more memory than is available. `refusal` makes the error from the available bytes.
 ///
 /// # Errors
-/// [`TooLittleMemory`], where the system says what is available and it is less than `needed`.
+/// [`TooLittleMemory`] if the system reports the available bytes and they are fewer than `needed`.
 pub fn check_available(needed: u64, refusal: impl FnOnce(u64) -> TooLittleMemory) -> Result<(), TooLittleMemory> {
     match available_bytes() {
         Some(available) if needed > available => Err(refusal(available)),
@@ -34,12 +39,12 @@ pub fn check_available(needed: u64, refusal: impl FnOnce(u64) -> TooLittleMemory
     }
 }
 
-/// Bytes of this process in memory now.
+/// Resident memory of this process now, bytes.
 pub fn resident_bytes() -> u64 {
     field("/proc/self/status", "VmRSS:").unwrap_or(0)
 }
 
-/// Largest resident memory of this process so far.
+/// Largest resident memory of this process so far, bytes.
 pub fn peak_memory_bytes() -> u64 {
     let usage = nix::sys::resource::getrusage(nix::sys::resource::UsageWho::RUSAGE_SELF);
     // Linux counts in KiB.
@@ -50,7 +55,7 @@ fn machine() -> Option<u64> {
     field("/proc/meminfo", "MemAvailable:")
 }
 
-/// The soft limit of address space, less what is taken of it.
+/// Bytes left below the soft limit of address space.
 fn address_space() -> Option<u64> {
     let (soft, _) = nix::sys::resource::getrlimit(nix::sys::resource::Resource::RLIMIT_AS).ok()?;
     (soft != nix::libc::RLIM_INFINITY).then(|| soft.saturating_sub(field("/proc/self/status", "VmSize:").unwrap_or(0)))
@@ -64,7 +69,7 @@ fn field(path: &str, name: &str) -> Option<u64> {
     Some(kib * 1024)
 }
 
-/// What the process's control groups leave, of versions 1 and 2.
+/// Bytes left below the limits of the process's control groups, of versions 1 and 2.
 fn control_groups() -> Option<u64> {
     let text = fs::read_to_string("/proc/self/cgroup").ok()?;
     let lines = text.lines().filter_map(|line| {
@@ -82,13 +87,13 @@ fn control_groups() -> Option<u64> {
     lines.min()
 }
 
-/// The least that a group and those above it leave. A limit of "max" is none.
+/// The smallest number of bytes that a group and its ancestors leave. The limit "max" means unlimited.
 fn group_limit(root: &str, group: &str, [limit, usage]: [&str; 2]) -> Option<u64> {
     let number = |path: &Path| -> Option<u64> { fs::read_to_string(path).ok()?.trim().parse().ok() };
     let left = |group: &Path| {
         let folder = Path::new(root).join(group);
         let limit = number(&folder.join(limit))?;
-        // Cached files count as used, and give way.
+        // The group counts cached files as used, but the kernel drops them when memory is needed.
         let text = fs::read_to_string(folder.join("memory.stat")).unwrap_or_default();
         let cached = text.lines().find_map(|line| {
             line.strip_prefix("inactive_file ")

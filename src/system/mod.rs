@@ -1,4 +1,4 @@
-//! The machine around the program: files in and out, memory, progress, numbers as people read them.
+//! The machine around the program: input and output files, memory, progress bars, and numbers as text.
 
 pub mod format;
 pub mod input;

@@ -1,18 +1,18 @@
-//! Progress bars on standard error, only where a person watches.
+//! Progress bars on standard error. They appear only on a terminal.
 
 use std::io::IsTerminal;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// Whether and how progress is shown.
+/// Whether progress bars are shown.
 #[derive(Debug, Clone, Copy)]
 pub struct Progress {
     visible: bool,
 }
 
 impl Progress {
-    /// Shown on terminals unless the user said no.
+    /// Bars are shown if they are `wanted` and standard error is a terminal.
     pub fn new(wanted: bool) -> Progress {
         Progress { visible: wanted && std::io::stderr().is_terminal() }
     }
@@ -21,7 +21,7 @@ impl Progress {
         Progress { visible: false }
     }
 
-    /// A bar for one stage of `length` steps; it goes away with `finish_and_clear`.
+    /// A bar for one stage of `length` steps. `finish_and_clear` removes it.
     pub fn stage(&self, name: &'static str, length: usize) -> ProgressBar {
         if !self.visible {
             return ProgressBar::hidden();

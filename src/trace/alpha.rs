@@ -1,4 +1,4 @@
-//! Alpha tests: rays pass MASK and BLEND surfaces where the texture, or chance, says so.
+//! Alpha tests. Rays pass MASK surfaces where their alpha is low, and BLEND surfaces by chance.
 
 use std::ffi::c_void;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -9,7 +9,7 @@ use glam::Vec2;
 use crate::math::random::hash_to_unit;
 use crate::scene::{Scene, TriangleIndex};
 
-// Places of the fields in Embree's ray and hit packets of size one (rtcore_ray.h), in words.
+// Offsets of the fields in Embree's ray and hit packets of size one (rtcore_ray.h), in 32-bit words.
 const RAY_DIRECTION_X: usize = 4;
 const RAY_ID: usize = 10;
 const HIT_U: usize = 3;
@@ -38,11 +38,12 @@ pub unsafe extern "C" fn filter(arguments: *const RTCFilterFunctionNArguments) {
     };
     // SAFETY: `Tracer` set this pointer to a scene that it borrows for its whole life.
     let scene = unsafe { &*(arguments.geometryUserPtr as *const Scene) };
-    // A panic must not unwind into Embree; none is expected, as the loader has checked every index.
+    // A panic must not unwind into Embree. None is expected, because the loader has checked every index.
     let stopped = catch_unwind(AssertUnwindSafe(|| {
         let triangle = TriangleIndex(scene.mesh.opaque_count as u32 + primitive);
         let opacity = scene.opacity(triangle, Vec2::new(u, v));
-        // Chance by ray and triangle: the same whichever order Embree visits triangles in.
+        // The random number depends on the ray and the triangle, so the order in which Embree visits triangles has no
+        // effect.
         opacity > hash_to_unit(salt, direction_bits, primitive)
     }))
     .unwrap_or(true);

@@ -1,10 +1,10 @@
-//! The memory layouts shared with Embree and the few calls made on them.
+//! The memory layouts shared with Embree, and the calls that use them.
 
 use std::ptr::null_mut;
 
 use embree4_sys::{RTCRay, RTCRayHit, RTCScene};
 
-/// `RTCRayHit` of the bindings (Embree 4.2) and the field that 4.3 and later write behind it.
+/// `RTCRayHit` of the bindings (Embree 4.2), followed by the field that Embree 4.3 and later add.
 #[repr(C, align(16))]
 pub struct RayHit {
     pub base: RTCRayHit,
@@ -13,7 +13,7 @@ pub struct RayHit {
     pub canary: [u32; 3],
 }
 
-/// Written behind the last field that Embree may write; a test checks that it survives.
+/// A pattern behind the last field that Embree may write. Tests check that it stays unchanged.
 pub const CANARY: [u32; 3] = [0x5EED_CAFE, 0x0DDB_A115, 0x1F00_57E9];
 
 /// `RTCRay` with the alignment that the C header asks for.
@@ -40,11 +40,11 @@ impl RayHit {
 /// `scene` is a live, committed scene that no one modifies during the call.
 #[inline]
 pub unsafe fn intersect(scene: RTCScene, ray_hit: &mut RayHit) {
-    // SAFETY: the caller vouches for the scene; `RayHit` has room for what any Embree 4 writes, and is aligned.
+    // SAFETY: the caller guarantees the scene. `RayHit` is aligned and has room for all that Embree 4 writes.
     unsafe { embree4_sys::rtcIntersect1(scene, std::ptr::from_mut(ray_hit).cast(), null_mut()) }
 }
 
-/// Whether anything lies on the ray. Embree answers by `tfar = −∞`.
+/// Whether anything lies on the ray. Embree then sets `tfar = −∞`.
 ///
 /// # Safety
 /// As [`intersect`].
@@ -62,10 +62,10 @@ mod tests {
     use embree4_rs::geometry::{Geometry, TriangleMeshGeometry};
     use embree4_sys as sys;
 
-    /// What nobody writes by chance.
+    /// A byte that Embree is unlikely to write.
     const FILL: u8 = 0xA5;
 
-    /// A ray-hit between two stretches of filled memory, as large as a field or two more could be.
+    /// A ray-hit between two filled ranges of memory. Each range is larger than any field that Embree might add.
     #[repr(C, align(64))]
     struct Guarded {
         before: [u8; 64],

@@ -1,8 +1,8 @@
-//! Rays against the scene, by Embree. Everything unsafe of the project is in this module.
+//! Ray tracing with Embree. This module holds all unsafe code of the project.
 //!
-//! `embree4-rs` makes the device and the geometry; scene and queries go to `embree4-sys` directly, because those
-//! bindings are Embree 4.2's: from 4.3 on the library writes one more field (`instPrimID`) behind the bindings'
-//! 80-byte ray-hit, so rays are traced into a struct of our own that has room for it ([`ffi::RayHit`]).
+//! `embree4-rs` creates the device and the geometry. Scenes and queries use `embree4-sys` directly. The reason: both
+//! crates bind Embree 4.2, and from 4.3 on the library writes one more field (`instPrimID`) behind the 80 bytes of
+//! their ray-hit. Rays are therefore traced into [`ffi::RayHit`], which has room for that field.
 #![allow(unsafe_code)]
 
 mod alpha;
@@ -12,7 +12,7 @@ mod tracer;
 
 pub use tracer::{Hit, Ray, RayLog, Tracer};
 
-/// Why no rays can be traced.
+/// Why rays cannot be traced.
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
     #[error(

@@ -1,23 +1,24 @@
-//! How far a ray must start from the surface it leaves, lest it hits that surface again.
+//! Offsets of ray ends from surfaces. Without them a ray could hit the surface that it leaves or ends at.
 
 use glam::Vec3;
 
-/// Offset in units of the floating-point spacing at the triangle's largest coordinate.
+/// Offset in units of ε·c, where ε is f32's relative spacing and c the largest coordinate of the triangle.
 ///
-/// A hit point computed from its triangle is off by about two roundings of the largest coordinate c of the
-/// triangle's vertices, Embree's distance to that triangle by about six (three products of edge lengths ≤ 2c, summed);
-/// 32 leaves a factor of four, and is 15 µm at 4 m.
+/// Two errors add up. A hit point computed from its triangle is off by about two roundings of c. Embree's distance to
+/// the triangle is off by about six, because it sums three products of edge lengths ≤ 2c. The sum is 8; 32 leaves a
+/// factor of four. At c = 4 m the offset is 15 µm.
 const OFFSET_ULPS: f32 = 32.0;
 
-/// Distance, metres, by which a ray from `origin` must end short of a surface that it must not hit, however near the scene's
-/// origin that surface lies: Embree moves every triangle by the ray's origin first, so that its rounding counts too.
+/// Least distance, metres, between the end of a ray from `origin` and a surface that the ray must not hit. It depends
+/// on the ray's origin, because Embree first translates every triangle by that origin and rounds the result.
 pub fn end_offset(origin: Vec3) -> f32 {
     OFFSET_ULPS * f32::EPSILON * origin.abs().max_element()
 }
 
-/// Distance, metres, to start rays off a triangle with these corners. Scales with the scene: no absolute length in it.
+/// Distance, metres, between the start of a ray and the triangle with these corners that it leaves. It scales with the
+/// scene and contains no absolute length.
 pub fn ray_offset(corners: &[Vec3; 3]) -> f32 {
     let largest = corners.iter().map(|c| c.abs().max_element()).fold(0.0, f32::max);
-    // Where everything lies at the origin exactly there is still the smallest normal number.
+    // The offset is never 0, even if all corners lie exactly at the origin.
     (OFFSET_ULPS * f32::EPSILON * largest).max(f32::MIN_POSITIVE)
 }

@@ -1,4 +1,4 @@
-//! The scene as Embree sees it, and the two questions asked of it.
+//! The scene in Embree, and its two queries: the closest hit and occlusion.
 
 use std::cell::RefCell;
 use std::marker::PhantomData;
@@ -13,14 +13,14 @@ use super::ffi::{self, AlignedRay, RayHit};
 use super::{TraceError, alpha};
 use crate::scene::{Scene, TriangleIndex};
 
-/// A ray, or with finite `t_max` a segment, `origin + t·direction` with t in `[0, t_max]`.
+/// A ray: the points `origin + t·direction` with t in `[0, t_max]`. A finite `t_max` makes it a segment.
 #[derive(Debug, Clone, Copy)]
 pub struct Ray {
     pub origin: Vec3,
-    /// Any length but zero; `t` counts in its units.
+    /// Of any length above zero. `t` is measured in this length.
     pub direction: Vec3,
     pub t_max: f32,
-    /// Rays with different salts meet BLEND surfaces with independent chances.
+    /// Seed of the chance with which BLEND surfaces stop the ray. Rays of different salts are stopped independently.
     pub salt: u32,
 }
 
@@ -54,7 +54,7 @@ impl Ray {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// In lengths of the ray's direction.
+    /// Distance in units of the length of the ray's direction.
     pub t: f32,
     pub triangle: TriangleIndex,
     /// Weights of the triangle's second and third vertex.
@@ -63,15 +63,15 @@ pub struct Hit {
 
 /// A committed Embree scene over all triangles of a [`Scene`].
 ///
-/// Opaque triangles are geometry 0; those with an alpha test are geometry 1 and carry the filter, so that opaque
-/// ones pay nothing for it. Queries may come from any number of threads.
+/// Opaque triangles are geometry 0. Triangles with an alpha test are geometry 1, and only these have the filter
+/// function, so opaque triangles cost nothing extra. Any number of threads may query at once.
 pub struct Tracer<'s> {
     handle: sys::RTCScene,
     /// First triangle of each geometry.
     first_triangle: [u32; 2],
     /// Set while rays are logged for [`Tracer::replay`].
     recording: AtomicBool,
-    /// Released after the scene handle: `Drop` below runs before the fields'.
+    /// Released after the scene handle, because `Drop` below runs before the fields are dropped.
     _device: Device,
     _scene: PhantomData<&'s Scene>,
 }
@@ -84,10 +84,10 @@ unsafe impl Send for Tracer<'_> {}
 impl<'s> Tracer<'s> {
     /// Builds the acceleration structure.
     ///
-    /// On one thread whatever the machine has: a parallel build orders the triangles of a leaf by who was first,
-    /// which decides between surfaces at equal distance, and the same input must give the same bytes.
+    /// The build uses one thread on every machine, because equal input must give equal bytes. In a parallel build the
+    /// order of a leaf's triangles depends on timing, and this order decides between surfaces at equal distance.
     pub fn build(scene: &'s Scene) -> Result<Tracer<'s>, TraceError> {
-        // The bindings pass this string to C as it is: it must carry its own NUL.
+        // The bindings pass this string to C unchanged, so it must end with a NUL.
         let device = Device::try_new(Some("threads=1,set_affinity=0\0"))
             .map_err(|e| TraceError::Embree { action: "start", reason: e.to_string() })?;
         let device_handle = device_handle(&device);
@@ -108,7 +108,8 @@ impl<'s> Tracer<'s> {
     }
 
     fn commit(&self, scene: &'s Scene) -> Result<(), TraceError> {
-        // SAFETY: the handle is live and not yet shared. Robust: no ray slips between two triangles of one edge.
+        // SAFETY: the handle is live and not yet shared.
+        // ROBUST: no ray passes between two triangles that share an edge.
         unsafe {
             sys::rtcSetSceneFlags(self.handle, sys::RTCSceneFlags::ROBUST);
             sys::rtcSetSceneBuildQuality(self.handle, sys::RTCBuildQuality::HIGH);
@@ -140,7 +141,7 @@ impl<'s> Tracer<'s> {
         check(&self._device, "build its acceleration structure")
     }
 
-    /// The nearest surface along the ray that stops it.
+    /// The nearest surface that stops the ray.
     #[inline]
     pub fn closest(&self, ray: Ray) -> Option<Hit> {
         self.log(Question::Closest, ray);
@@ -168,14 +169,14 @@ impl<'s> Tracer<'s> {
     }
 }
 
-/// Rays as they were asked, for measuring what Embree alone takes for them.
+/// The query that a logged ray was for.
 #[derive(Debug, Clone, Copy)]
 enum Question {
     Closest,
     Occluded,
 }
 
-/// The rays that one call of [`Tracer::record`] asked, in order.
+/// The rays of one call of [`Tracer::record`], in order. They serve to measure the time that Embree alone takes.
 #[derive(Debug, Clone, Default)]
 pub struct RayLog(Vec<(Question, Ray)>);
 
@@ -206,14 +207,14 @@ impl Tracer<'_> {
         }
     }
 
-    /// Runs `work` on this thread and returns the rays that it asked while recording was on.
+    /// Runs `work` on this thread and returns the rays that it traced on this thread while recording was on.
     pub fn record(&self, work: impl FnOnce()) -> RayLog {
         LOG.take();
         work();
         RayLog(LOG.take())
     }
 
-    /// Asks Embree the logged rays again and does nothing with the answers.
+    /// Traces the logged rays again and ignores the results.
     pub fn replay(&self, log: &RayLog) {
         for (question, ray) in &log.0 {
             // SAFETY: committed in `build`, immutable since.
@@ -235,12 +236,12 @@ impl Tracer<'_> {
 
 impl Drop for Tracer<'_> {
     fn drop(&mut self) {
-        // SAFETY: the only release of the reference that `rtcNewScene` gave.
+        // SAFETY: this is the only release of the reference that `rtcNewScene` returned.
         unsafe { sys::rtcReleaseScene(self.handle) };
     }
 }
 
-/// The handle inside the crate's device, which it keeps to itself.
+/// The handle inside the crate's device. The crate does not expose it.
 fn device_handle(device: &Device) -> sys::RTCDevice {
     const { assert!(size_of::<Device>() == size_of::<sys::RTCDevice>()) };
     // SAFETY: `Device` has the size of its only field, the handle, which therefore lies at offset 0.
@@ -254,11 +255,11 @@ fn check(device: &Device, action: &'static str) -> Result<(), TraceError> {
     }
 }
 
-/// Refuses libraries older than the interface in use.
+/// Refuses an Embree library older than version 4.
 fn check_version(device: sys::RTCDevice) -> Result<(), TraceError> {
     // SAFETY: the device is live.
     let version = unsafe { sys::rtcGetDeviceProperty(device, sys::RTCDeviceProperty::VERSION) };
-    // Version 4.3.2 reads 40302.
+    // Embree reports version 4.3.2 as 40302.
     if version < 40_000 {
         let found = format!("{}.{}.{}", version / 10_000, version / 100 % 100, version % 100);
         return Err(TraceError::TooOld { found });

@@ -24,8 +24,8 @@ use crate::probe::file::{self, ProbeFile};
 use crate::probe::query::Query;
 use crate::report::render::{RenderReport, RenderTimes, SCHEMA};
 use crate::scene::{Camera, Scene};
-use crate::shade::methods::Method;
 use crate::shade::points::see;
+use crate::shade::visibility_modes::VisibilityMode;
 use crate::system::memory::peak_memory_bytes;
 use crate::system::output::{Named, create_folder};
 
@@ -147,7 +147,7 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
     let (args, session, volume) = (run.args, run.session, &run.volume);
     let settings = &run.probes.query.weights;
     let query = Query { volume, settings };
-    let bar = session.console.progress.stage("rendering", 2 + Method::ALL.len());
+    let bar = session.console.progress.stage("rendering", 2 + VisibilityMode::ALL.len());
     let primary_started = Instant::now();
     let view = see(run.world, camera, args.view.size.width, args.view.size.height, session.seed);
     let primary_s = primary_started.elapsed().as_secs_f64();
@@ -159,7 +159,7 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
     // What is left of the error when the probes are right and visibility exact comes from interpolation between probes.
     let mut path_traced = run.truth.as_ref().map(|BakedTruth { truth, .. }| {
         let query = Query { volume: &truth.volume, settings };
-        scenery.shade_again(&query, &masks, Method::Ray, PATH_RAY, &shaded[2].report)
+        scenery.shade_again(&query, &masks, VisibilityMode::Ray, PATH_RAY, &shaded[2].report)
     });
     let baked = run.truth.as_ref().map(|t| t.report.clone());
     for s in &mut shaded {
@@ -206,7 +206,7 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
 fn compare<'s>(run: &Run, reference: &Reference, exposure_ev: f32, shaded: impl Iterator<Item = &'s mut Shaded>) {
     let Reference { layers, regions, glossy, .. } = reference;
     let comparison = Comparison { layers, regions, glossy: *glossy, exposure_ev, seed: run.session.seed };
-    let bar = run.session.console.progress.stage("comparing", Method::ALL.len());
+    let bar = run.session.console.progress.stage("comparing", VisibilityMode::ALL.len());
     shaded.for_each(|shaded| {
         shaded.compare(&comparison);
         bar.inc(1);

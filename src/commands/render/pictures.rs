@@ -40,8 +40,8 @@ pub fn write(
         None => Picture8::filled(view.width, view.height, [0; 3]),
     };
     for s in shaded {
-        s.image.write_exr(&file(s.method.name(), "exr"))?;
-        tonemapped(&s.image).write_png(&file(s.method.name(), "png"))?;
+        s.image.write_exr(&file(s.mode.name(), "exr"))?;
+        tonemapped(&s.image).write_png(&file(s.mode.name(), "png"))?;
     }
     let [off, on, exact] = shaded;
     let difference = |s: &Shaded| {

@@ -11,8 +11,8 @@ use crate::report::sweep::{
     MethodFigures, OnFront, RunRecord, SCHEMA, SweepReport, SweepTimes,
 };
 use crate::scene::Camera;
-use crate::shade::methods::Method;
 use crate::shade::points::View;
+use crate::shade::visibility_modes::VisibilityMode;
 use crate::sweep::equal;
 use crate::sweep::front::{cheapest, levels, pareto};
 use crate::sweep::ladder::{Ladder, Rung};
@@ -50,7 +50,7 @@ const FIGURES: &[(&str, Figure)] = &[
 impl Outcome {
     pub fn new(ladder: usize, rung: &Rung, runs: Vec<RunRecord>, split: Split, reference_mean: Option<f64>) -> Outcome {
         let value = |figure: Figure| -> Vec<Option<f64>> {
-            runs.iter().map(|run| figure(run, run.method(Method::On.name())?)).collect()
+            runs.iter().map(|run| figure(run, run.method(VisibilityMode::On.name())?)).collect()
         };
         let figures: BTreeMap<&'static str, Aggregate> =
             FIGURES.iter().map(|(name, figure)| (*name, Aggregate::of(&value(*figure)))).collect();

@@ -19,7 +19,7 @@ use crate::light::path::PathSettings;
 use crate::light::sampled::{Allocation, RayCount};
 use crate::light::surface::SurfacePoint;
 use crate::math::blocks::{BLOCK, Block};
-use crate::math::random::{Purpose, Random, Spread};
+use crate::math::random::{KroneckerSequence, Purpose, Random};
 use crate::math::statistics::Moments;
 use crate::trace::Ray;
 
@@ -279,7 +279,7 @@ impl Capture<'_, '_> {
     fn sample_emitters(&self, index: usize, position: Vec3, count: u32, layout: &Layout, out: &mut ProbeCapture) {
         let world = self.world;
         let mut random = Random::new(self.seed, Purpose::ProbeEmission, index as u64, 0);
-        for bits in Spread::new(&mut random).take(count as usize) {
+        for bits in KroneckerSequence::new(&mut random).take(count as usize) {
             let Some(sample) = world.emitters.sample(world.scene, position, bits) else { continue };
             if sample.radiance == Vec3::ZERO {
                 continue;

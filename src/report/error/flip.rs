@@ -1,13 +1,18 @@
-//! FLIP, the difference that an observer sees when flipping between two pictures (P. Andersson et al., "FLIP: A Difference Evaluator
-//! for Alternating Images", HPG 2020), by its authors' own code.
+//! FLIP, the difference that an observer sees when flipping between two pictures (P. Andersson et al., "FLIP: A
+//! Difference Evaluator for Alternating Images", HPG 2020). It is computed by its authors' code.
 //!
-//! It has no derivative to speak of, so what the reference's noise does to it is found by a parametric bootstrap: a picture that
-//! stands for the truth gets noise of the reference's own kind, normal with the variance of each pixel, and the mean shift that this
-//! makes is taken away from the figure. The reference itself cannot stand for the truth, as it is just where there is no difference
-//! that noise does most. Its difference from the method is therefore shrunk to the size that it has without noise, around each pixel.
-//! In simulations (no difference, constants, ramps, steps, voxels; four references each) what remained of the noise's effect was mostly
-//! below the shift, which therefore counts as an error beside the replicates' spread. That does not cover smooth differences under
-//! little noise: there the shift is far too small a bound, what remained was up to five times it, 0.002 of FLIP.
+//! The noise of the reference raises FLIP. FLIP is not smooth enough for a correction by derivatives, so a parametric
+//! bootstrap finds the effect. A stand-in for the true picture gets noise like that of the reference: normal, with the
+//! variance of each pixel. The mean shift of FLIP that this causes is subtracted from the figure.
+//!
+//! The reference itself cannot be the stand-in. Noise has the largest effect where there is no difference, and a noisy
+//! reference differs from the picture everywhere. So the stand-in is the reference with its difference from the picture
+//! shrunk, around each pixel, to the size that it has without noise ([`shrunk`]).
+//!
+//! The correction is not exact. In simulations (no difference, constants, ramps, steps, voxels; four references each)
+//! the effect that remained was mostly smaller than the shift. The shift is therefore added to the standard error. An
+//! exception are smooth differences under little noise: there the remaining effect was up to five times the shift,
+//! which is 0.002 of FLIP.
 
 use std::f32::consts::TAU;
 
@@ -21,28 +26,29 @@ use crate::math::random::{Purpose, Random};
 use crate::report::reference_layers::ReferenceLayers;
 use crate::shade::regions::Region;
 
-/// Replicates of the reference: their spread is known to a quarter.
+/// Number of replicates of the bootstrap. Eight determine their spread to about a quarter.
 const REPLICATES: u64 = 8;
 
-/// Mean of FLIP's map over some part of the picture.
+/// Mean of FLIP's map over one part of the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Flip {
-    /// 0 (no difference) to 1; `None` without pixels.
+    /// From 0 (no difference) to 1. `None` without pixels.
     pub mean: Option<f64>,
-    /// `None` where the reference's noise is not known.
+    /// `None` if the noise of the reference is not known.
     pub standard_error: Option<f64>,
 }
 
-/// The whole picture with all that is no surface, its corners, its flat parts.
+/// FLIP of the three parts of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Flips {
+    /// All pixels (also those without a surface), the corners, and the flat parts.
     pub parts: [Flip; 3],
 }
 
-/// FLIP between the reference and a method's beauty, both as a screen shows them at this exposure.
+/// FLIP between the beauty of the reference and `beauty`, both tone-mapped at this exposure.
 ///
 /// # Panics
-/// When `beauty` or `regions` are not of the reference's size.
+/// If `beauty` or `regions` have not the size of the reference.
 pub fn measure(
     reference: &ReferenceLayers,
     beauty: &Picture,
@@ -67,6 +73,7 @@ pub fn measure(
     Flips { parts: [0, 1, 2].map(|i| part(i).unwrap_or_default()) }
 }
 
+/// The measured mean minus the mean shift. `shifts` holds the shift of each replicate.
 fn corrected(measured: f64, shifts: &[f64]) -> Flip {
     let count = shifts.len() as f64;
     let shift = shifts.iter().sum::<f64>() / count;
@@ -77,8 +84,8 @@ fn corrected(measured: f64, shifts: &[f64]) -> Flip {
     }
 }
 
-/// The reference with its difference d from `beauty` shrunk by √((Σd² − Σv)/Σd²) over each pixel's neighbourhood, v being the
-/// variance.
+/// The reference with its difference d from `beauty` multiplied by √((Σd² − Σv)/Σd²), where v is the variance. Sums are
+/// over the neighbourhood of each pixel.
 fn shrunk(reference: &Picture, beauty: &Picture, variance: &[Vec3]) -> Picture {
     let difference = |i: usize| (beauty.pixels[i] - reference.pixels[i]).as_dvec3();
     let usable = |i: usize| difference(i).is_finite() && variance[i].is_finite();
@@ -96,15 +103,16 @@ fn shrunk(reference: &Picture, beauty: &Picture, variance: &[Vec3]) -> Picture {
     Picture::from_pixels(reference.width, reference.height, (0..reference.pixels.len()).map(pixel).collect())
 }
 
-/// Per pixel, row 0 at the top.
+/// FLIP of every pixel, row 0 at the top.
 ///
 /// # Panics
-/// When the two differ in size.
+/// If the pictures differ in size.
 pub fn flip_map(reference: &Picture8, shown: &Picture8) -> Vec<f32> {
     let image = |p: &Picture8| FlipImageRgb8::with_data(p.width, p.height, p.pixels.as_flattened());
     nv_flip::flip(image(reference), image(shown), DEFAULT_PIXELS_PER_DEGREE).to_vec()
 }
 
+/// Means of a map over the parts of [`Flips::parts`].
 fn part_means(map: &[f32], regions: &[Option<Region>]) -> [Option<f64>; 3] {
     assert_eq!(map.len(), regions.len(), "pixels of the regions");
     let mean = |shown: &dyn Fn(Option<Region>) -> bool| {
@@ -118,13 +126,13 @@ fn part_means(map: &[f32], regions: &[Option<Region>]) -> [Option<f64>; 3] {
     [mean(&|_| true), mean(&|r| r == Some(Region::Corner)), mean(&|r| r == Some(Region::Flat))]
 }
 
-/// The picture with normal noise of this variance added. All channels of a pixel by the same number of deviations: a path carries
-/// all three, so that they err together.
+/// The picture plus normal noise of this variance. All channels of a pixel deviate by the same number of standard
+/// deviations, because the same paths give all three.
 fn noisier(picture: &Picture, variance: &[Vec3], seed: u64, replicate: u64) -> Picture {
     let disturbed = |(i, pixel): (usize, &Vec3)| {
         let mut random = Random::new(seed, Purpose::FlipReplicate, i as u64, replicate);
         let deviation = variance[i].max(Vec3::ZERO).map(f32::sqrt);
-        // A variance that is no number leaves the pixel alone: it is no number itself, or will not be shown.
+        // A pixel whose variance is not finite stays unchanged.
         let noise = deviation * standard_normal(&mut random);
         if noise.is_finite() { *pixel + noise } else { *pixel }
     };
@@ -132,7 +140,7 @@ fn noisier(picture: &Picture, variance: &[Vec3], seed: u64, replicate: u64) -> P
     Picture::from_pixels(picture.width, picture.height, pixels)
 }
 
-/// G. E. P. Box & M. E. Muller 1958.
+/// A standard normal number (G. E. P. Box & M. E. Muller 1958).
 fn standard_normal(random: &mut Random) -> f32 {
     // In (0, 1]: the logarithm of 0 would be infinite.
     let radius = (-2.0 * (1.0 - random.uniform()).ln()).sqrt();

@@ -1,25 +1,30 @@
-//! Error figures: how far a picture is from its reference, and how well the reference allows to know.
+//! Error figures: the differences between a picture and its reference, and their uncertainty.
 //!
-//! All are of the indirect irradiance, every channel of every pixel that shows a surface counted alike; FLIP is of what a screen
-//! shows. e is the method's value, r the reference's, d = e − r, v the variance of r, M the number of pixels × channels:
+//! All figures except `flip` compare the indirect irradiance. Every channel of every pixel that shows a surface has the
+//! same weight. `flip` compares the tone-mapped pictures.
 //!
-//! | figure | definition | freed from the reference's noise |
+//! The reference has noise, which would raise most figures. The third column gives the figure without this effect. Here
+//! e is the value of the picture, r that of the reference, d = e − r, v the variance of r, and M the number of pixels ×
+//! channels.
+//!
+//! | figure | definition | estimate without the reference's noise |
 //! |---|---|---|
-//! | `bias` | Σd/M | has none |
+//! | `bias` | Σd/M | the same |
 //! | `rmse` | √(Σd²/M) | √(max(0, Σ(d² − v)/M)) |
 //! | `relmse` | Σ(d²/(r² + ε))/M, ε = 10⁻²·mean(r)² | [`terms::relative_square`]; d² − v where noise is small |
 //! | `mae` | Σ\|d\|/M | Σ(\|d\| − b)/M with the folded normal's b, [`terms::fold`] |
 //! | `over`, `under` | Σmax(0, ±d)/M | Σ(max(0, ±d) − b/2)/M |
-//! | `psnr_db` | 20·log₁₀(peak/rmse) | through `rmse`; the peak's noise is in the standard error |
+//! | `psnr_db` | 20·log₁₀(peak/rmse) | through `rmse`; the standard error contains the peak's noise |
 //! | `flip` | mean of LDR-FLIP's map | [`flip`] |
 //!
-//! The peak is the largest value of the reference, as is usual for pictures without a largest possible one.
-//! Standard errors follow from v by the delta method ([`pooled::Pooled`]); pixels are independent. To them comes what the
-//! corrections themselves may be wrong by: a share of b, and relative squares where the noise is as large as what they are
-//! relative to.
+//! The peak is the largest value of the reference. This is usual for pictures whose values have no upper limit.
 //!
-//! The reference is too noisy for some part of the picture where there Σv > Σ(d² − v): the noise exceeds the difference. Figures
-//! pooled over many pixels may be well determined all the same, which is what their standard errors say.
+//! Standard errors follow from v by the delta method ([`pooled::Pooled`]) for independent pixels. They also contain the
+//! uncertainty of the corrections: a share of b, and a share of the correction of relative squares, or the whole term
+//! where the noise is as large as the denominator.
+//!
+//! The verdict of a part of the picture is "reference too noisy" if Σv > Σ(d² − v) there, that is, if the noise exceeds
+//! the difference. Figures pooled over many pixels can still be well determined; their standard errors tell.
 
 pub mod flip;
 pub mod pooled;
@@ -38,25 +43,26 @@ use window::window_means;
 /// ε of `relmse`, as a share of the squared mean of the reference.
 const RELATIVE_FLOOR: f64 = 1.0e-2;
 
-/// By how much the corrections of `relmse` may be wrong, as a share of themselves: they are those of normal noise, and that of
-/// paths which rarely find light is skew. With 256 samples per pixel in the dark one of two open rooms they left a quarter.
+/// Uncertainty of the correction of `relmse`, as a share of the correction. The correction assumes normal noise, but
+/// the noise of paths that rarely find light is skewed. In a measurement at 256 samples per pixel, in the dark one of
+/// two open rooms, the correction left a quarter of the noise's effect.
 const RELATIVE_UNCERTAINTY: f64 = 0.3;
 
-/// Where the noise exceeds the difference.
+/// Verdict if the noise of the reference exceeds the difference.
 const TOO_NOISY: &str = "reference too noisy";
 
-/// Where nothing is known about the noise.
+/// Verdict if the noise of the reference is not known.
 const NOISE_UNKNOWN: &str =
     "no error estimate: the reference does not say how noisy it is (below 32 samples per pixel it cannot)";
 
-/// Figures, or their standard errors. Undefined ones are `null`.
+/// The error figures, or their standard errors. Undefined figures are `null`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Figures {
     /// W·m⁻², as are `rmse`, `bias`, `over`, `under`.
     pub mae: Option<f64>,
     pub rmse: Option<f64>,
     pub relmse: Option<f64>,
-    /// Positive where the method is too bright.
+    /// Positive if the picture is too bright.
     pub bias: Option<f64>,
     pub over: Option<f64>,
     pub under: Option<f64>,
@@ -64,42 +70,42 @@ pub struct Figures {
     pub flip: Option<f64>,
 }
 
-/// The figures of some part of the picture.
+/// The figures of one part of the picture: all of it or one region.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Measured {
+pub struct ErrorEstimate {
     pub pixels: usize,
     #[serde(flatten)]
     pub figures: Figures,
-    /// From the reference's own noise. `null` where that is not known.
+    /// From the noise of the reference. `null` if the noise is not known.
     pub standard_error: Figures,
-    /// Root of the mean variance of the reference, W·m⁻².
+    /// Root of the mean variance of the reference, W·m⁻². `null` if the noise is not known.
     pub noise_rms: Option<f64>,
-    /// Why not to rely on these figures; `null` where nothing speaks against them. "reference too noisy" where `noise_rms`
-    /// exceeds `rmse`.
+    /// The reason not to rely on these figures, for example "reference too noisy" if `noise_rms` exceeds `rmse`. `null`
+    /// if there is no such reason.
     pub verdict: Option<&'static str>,
 }
 
-/// The figures of a picture and of its regions.
+/// The figures of a picture and of its two regions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ErrorReport {
     #[serde(flatten)]
-    pub all: Measured,
+    pub all: ErrorEstimate,
     pub by_region: ByRegion,
-    /// ε of `relmse`, of the whole picture and its regions alike, W²·m⁻⁴.
+    /// ε of `relmse`, W²·m⁻⁴. It is the same for the whole picture and its regions.
     pub relmse_epsilon: f64,
-    /// Peak of `psnr_db`, of the whole picture and its regions alike, W·m⁻².
+    /// Peak of `psnr_db`, W·m⁻². It is the same for the whole picture and its regions.
     pub psnr_peak: f64,
-    /// Pixels left out because picture or reference is not finite there.
+    /// Number of pixels that are left out because the picture or the reference is not finite there.
     pub pixels_not_finite: usize,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ByRegion {
-    pub corner: Measured,
-    pub flat: Measured,
+    pub corner: ErrorEstimate,
+    pub flat: ErrorEstimate,
 }
 
-/// Sums over the pixels of a part.
+/// Sums over the pixels of one part of the picture.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     pixels: usize,
@@ -109,18 +115,20 @@ struct Sums {
     under: Pooled,
     square: Pooled,
     relative: Pooled,
+    /// Sum of the corrections [`fold`].
     fold: f64,
-    /// What the corrections of relative squares may be wrong by; all of them where the noise is as large as what they are
-    /// relative to.
+    /// Sum of the uncertainties of relative squares: a share of the correction, or the whole term where the noise is as
+    /// large as the denominator.
     doubtful: f64,
+    /// Sum of the variances v.
     noise: f64,
 }
 
-/// Compares a picture's indirect irradiance with the reference's. `regions`: of every pixel, `None` where it shows no surface.
-/// `flips`: figures of FLIP, where there are any.
+/// Compares a picture's indirect `irradiance` with the reference's. `regions` holds the region of every pixel, or
+/// `None` for pixels without a surface. `flips` holds the figures of FLIP, if they were measured.
 ///
 /// # Panics
-/// When `irradiance` or `regions` are not of the reference's size.
+/// If `irradiance` or `regions` have not as many pixels as the reference.
 pub fn measure(
     reference: &ReferenceLayers,
     irradiance: &[Vec3],
@@ -156,11 +164,11 @@ pub fn measure(
     }
 }
 
-/// The largest of many noisy values is so partly by chance: of 10⁴ equal ones by 3.7 deviations, of fewer candidates by
-/// less.
+/// Uncertainty of the peak in standard errors of its pixel. The largest of many noisy values is too large: among 10⁴
+/// equal values by 3.7 standard errors. Few pixels compete for the peak, so the excess is smaller.
 const PEAK_SIGMAS: f64 = 3.0;
 
-/// By how much the peak may be wrong: as many deviations of the pixel and channel that it was found in.
+/// Uncertainty of the peak, W·m⁻², from the noise of the pixel and channel in which it was found.
 fn peak_error(reference: &ReferenceLayers, mask: &[bool], peak: f64) -> f64 {
     let Some(noise) = &reference.noise else { return 0.0 };
     let channels = (0..mask.len()).filter(|&i| mask[i]).flat_map(|i| [0, 1, 2].map(|c| (i, c)));
@@ -168,8 +176,8 @@ fn peak_error(reference: &ReferenceLayers, mask: &[bool], peak: f64) -> f64 {
     at_peak.next().map_or(0.0, |(i, c)| PEAK_SIGMAS * noise.between(i, c, c).sqrt())
 }
 
-/// ε of `relmse` and the peak of `psnr_db`. The former is taken as exact: the noise of a mean over all pixels does not show
-/// beside that of the figures.
+/// ε of `relmse` and the peak of `psnr_db`. ε is taken as exact, because the noise of a mean over all pixels is
+/// negligible.
 fn scale(reference: &ReferenceLayers, mask: &[bool]) -> (f64, f64) {
     let (mut sum, mut count, mut peak) = (0.0, 0.0f64, 0.0f64);
     for (pixel, _) in reference.irradiance.iter().zip(mask).filter(|(_, used)| **used) {
@@ -183,18 +191,18 @@ fn scale(reference: &ReferenceLayers, mask: &[bool]) -> (f64, f64) {
     (RELATIVE_FLOOR * mean * mean, peak)
 }
 
-/// What the pixels around one say, per channel.
+/// Means over the neighbourhood of a pixel, per channel.
 #[derive(Debug, Clone, Copy)]
 struct Around {
     /// Mean of d.
     difference: [f64; 3],
-    /// Mean of v: that of a pixel is itself an estimate, from few blocks a poor one.
+    /// Mean of v. The v of one pixel is itself an estimate, and a poor one if it comes from few blocks.
     variance: [f64; 3],
     /// Mean of r² − v, an estimate of t².
     square: [f64; 3],
 }
 
-/// Of every pixel; `None` where the noise is not known.
+/// The neighbourhood means of every pixel. `None` if the noise is not known.
 fn look_around(reference: &ReferenceLayers, irradiance: &[Vec3], mask: &[bool]) -> Option<Vec<Around>> {
     let noise = reference.noise.as_ref()?;
     let values = |i: usize| {
@@ -220,7 +228,7 @@ impl Sums {
             let terms = Terms { value: t.map(|t| t.0), first: t.map(|t| t.1), second: t.map(|t| t.2) };
             to(self).add(&terms, noise);
         };
-        // 1 where d has that sign.
+        // The derivative of max(0, ±d) is ±1 for one sign of d and 0 for the other.
         let is = |yes: bool| if yes { 1.0 } else { 0.0 };
         add(|s| &mut s.bias, &|c| (d[c], -1.0, 0.0));
         add(|s| &mut s.absolute, &|c| (d[c].abs() - b[c], -d[c].signum(), 0.0));
@@ -247,10 +255,16 @@ impl Sums {
         self.noise += v.iter().sum::<f64>();
     }
 
-    fn finish(&self, noise_known: bool, epsilon: f64, (peak, peak_error): (f64, f64), flip: flip::Flip) -> Measured {
+    fn finish(
+        &self,
+        noise_known: bool,
+        epsilon: f64,
+        (peak, peak_error): (f64, f64),
+        flip: flip::Flip,
+    ) -> ErrorEstimate {
         if self.pixels == 0 {
             let (figures, standard_error) = Default::default();
-            return Measured { pixels: 0, figures, standard_error, noise_rms: None, verdict: None };
+            return ErrorEstimate { pixels: 0, figures, standard_error, noise_rms: None, verdict: None };
         }
         let samples = 3.0 * self.pixels as f64;
         let square = self.square.mean(samples).max(0.0);
@@ -269,7 +283,7 @@ impl Sums {
             flip: flip.mean,
         };
         let known = |error: f64| noise_known.then_some(error);
-        // What the correction for the fold may be wrong by is no noise: it does not fall with the number of pixels.
+        // The uncertainty of the correction by `fold` is systematic: it does not fall with the number of pixels.
         let folded = FOLD_UNCERTAINTY * self.fold / samples;
         let error = |pooled: &Pooled, systematic: f64| known(pooled.variance(samples).sqrt().hypot(systematic));
         let standard_error = Figures {
@@ -288,12 +302,13 @@ impl Sums {
             false => Some(NOISE_UNKNOWN),
             true => (noise > square).then_some(TOO_NOISY),
         };
-        Measured { pixels: self.pixels, figures, standard_error, noise_rms: known(noise.sqrt()), verdict }
+        ErrorEstimate { pixels: self.pixels, figures, standard_error, noise_rms: known(noise.sqrt()), verdict }
     }
 }
 
-/// Standard error of a root from that of its square, s: half the longer side of the interval that ± 2s of the square give. Where s
-/// is small that is s/(2x), as by the delta method, which knows no bounds near x = 0.
+/// Standard error of a root x from the standard error s of its square. It is half the larger of the distances from x to
+/// √(x² + 2s) and to √(max(0, x² − 2s)). For small s this equals s/(2x), the result of the delta method, which grows
+/// without bound near x = 0.
 fn root_error(root: f64, square_error: f64) -> f64 {
     let at = |sigmas: f64| (root * root + sigmas * square_error).max(0.0).sqrt();
     ((at(2.0) - root) / 2.0).max((root - at(-2.0)) / 2.0)

@@ -1,22 +1,25 @@
-//! A figure as a mean over pixels and channels, and what the reference's noise does to it.
+//! A figure as a mean over pixels and channels, with its variance from the noise of the reference.
 
 use crate::report::reference_layers::Noise;
 
-/// Pixels × channels of a figure f(r), r being the reference with its noise: Σf, and the variance of that sum.
+/// The sum Σf of a figure f(r) over pixels and channels, and the variance of the sum. r is the reference with its
+/// noise.
 ///
-/// To second order in the noise, for normal noise with the covariance C between two channels of a pixel,
-/// cov(f_a, f_b) = f_a′·f_b′·C + ½·f_a″·f_b″·C² with the derivatives at the true value. Those at the measured one give on
-/// average a term f_a″·f_b″·C² too much, which is taken away again: for the squared error f = d², where f′ = −2d and f″ = 2,
-/// the variance 4D²σ² + 2σ⁴ becomes 4d²σ² − 2σ⁴, whose expectation it is.
+/// Let C be the covariance between two channels of a pixel. For normal noise, to second order, cov(f_a, f_b) =
+/// f_a′·f_b′·C + ½·f_a″·f_b″·C², with derivatives at the true value of r. Only the measured value is known. Derivatives
+/// there give on average f_a″·f_b″·C² too much, which is subtracted.
+///
+/// Example: for the squared error f = d² the derivatives are f′ = −2d and f″ = 2. The variance 4D²σ² + 2σ⁴, with D the
+/// true difference, is estimated by 4d²σ² − 2σ⁴, which has the same expectation.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Pooled {
     sum: f64,
     variance: f64,
-    /// What is left of the variance where the difference is 0: the estimate must not fall below it.
+    /// The variance for a difference of 0. The estimate must not fall below it.
     floor: f64,
 }
 
-/// Value and first two derivatives of a figure in the reference, per channel of a pixel.
+/// Value of a figure and its first two derivatives with respect to the reference, per channel of a pixel.
 #[derive(Debug, Clone, Copy)]
 pub struct Terms {
     pub value: [f64; 3],
@@ -25,7 +28,7 @@ pub struct Terms {
 }
 
 impl Pooled {
-    /// Adds a pixel. `noise` is that of the reference, and the pixel's place in it.
+    /// Adds a pixel. `noise` is the noise of the reference and the index of the pixel.
     #[inline]
     pub fn add(&mut self, terms: &Terms, noise: Option<(&Noise, usize)>) {
         self.sum += terms.value.iter().sum::<f64>();
@@ -41,22 +44,22 @@ impl Pooled {
         }
     }
 
-    /// The mean over so many samples.
+    /// The mean, if `samples` pixels × channels were added.
     pub fn mean(&self, samples: f64) -> f64 {
         self.sum / samples
     }
 
-    /// The variance of the mean over so many samples.
+    /// The variance of the mean, if `samples` pixels × channels were added.
     pub fn variance(&self, samples: f64) -> f64 {
         self.variance.max(self.floor).max(0.0) / (samples * samples)
     }
 }
 
-/// What takes the place of ½ in the term of second order where the variance v is itself an estimate from k blocks.
+/// The factor that replaces ½ in the term of second order if the variance v is itself an estimate from k blocks.
 ///
-/// Subtracting it from d² adds its own variance, 2v²/(k−1), so that var(d² − v) = 4D²v + 2v²·k/(k−1); and E[v²] is
-/// (k+1)/(k−1) times the true square. The combination 4(d²−v)v + a·v² has the right expectation for a = (2k+8)/(k+1);
-/// here a/4, which is ½ for many blocks.
+/// The corrected square d² − v contains the variance of v, 2v²/(k−1), so var(d² − v) = 4D²v + 2v²·k/(k−1). Also, E[v²]
+/// is (k+1)/(k−1) times the square of the true variance. The combination 4(d²−v)v + a·v² has the right expectation for
+/// a = (2k+8)/(k+1). This function returns a/4, which tends to ½ for many blocks.
 fn square_share(blocks: Option<u32>) -> f64 {
     blocks.filter(|&k| k > 1).map_or(0.5, |k| {
         let k = f64::from(k);

@@ -1,28 +1,30 @@
-//! The figures' terms: what one pixel and channel contributes, freed from the reference's noise.
+//! The terms of the figures: the contribution of one pixel and channel, corrected for the noise of the reference.
 //!
-//! e is the method's irradiance, r the reference's, d = e − r; r = t + n with the truth t and normal noise n of the
-//! variance v; D = e − t.
+//! Symbols: e is the irradiance of the picture and r that of the reference. r = t + n, where t is the truth and n is
+//! normal noise of variance v. d = e − r is the measured difference and D = e − t the true one.
 
 use std::f64::consts::{PI, SQRT_2};
 
-/// By how much [`fold`] may be wrong, as a share of itself. Simulated for D/σ constant from 0 to 3, ramps through 0 and steps, and
-/// compared with what noise added to pictures of two real scenes at 64 and 512 samples per pixel: what remained of the bias was at
-/// most a quarter of the correction. It does not cover differences that change their sign from pixel to pixel: a checkerboard of ±2σ
-/// loses 0.6σ too much.
+/// Uncertainty of [`fold`] as a share of its value.
+///
+/// Source: simulations with D/σ constant from 0 to 3, with ramps through 0 and with steps; and noise added to pictures
+/// of two real scenes at 64 and 512 samples per pixel. The bias that remained was at most a quarter of the correction.
+/// Differences that change sign from pixel to pixel are not covered: for a checkerboard of ±2σ the correction is 0.6σ
+/// too large.
 pub const FOLD_UNCERTAINTY: f64 = 0.3;
 
-/// Differences of so many deviations are no noise, whatever the pixels around them say.
+/// A difference of more than this many standard deviations is real, even if the pixels around it have none.
 const SURE_SIGMAS: f64 = 3.0;
 
-/// Largest variance, as a share of the denominator r² + ε, that [`relative_square`] is continued into the complex plane for:
-/// √(3v) must stay clear of the poles, where 3v = r² + ε.
+/// Largest variance, as a share of the denominator r² + ε, for which [`relative_square`] is continued into the complex
+/// plane. At 3v = r² + ε, a share of ⅓, its nodes can reach the poles; this is half of that.
 const MAX_CONTINUED: f64 = 1.0 / 6.0;
 
-/// By how much noise of the variance `v` raises the mean of |d| above |D|: the mean of the folded normal distribution
-/// (Leone, Nelson & Nottingham 1961) minus |D|, σ·√(2/π)·exp(−D²/2v) − |D|·erfc(|D|/(σ√2)).
+/// The amount by which noise of variance `v` raises the mean of |d| above |D|. It is the mean of the folded normal
+/// distribution (Leone, Nelson & Nottingham 1961) minus |D|: σ·√(2/π)·exp(−D²/2v) − |D|·erfc(|D|/(σ√2)).
 ///
-/// The true D is not known, and the measured one would not do: it is far from 0 just where D is 0. `around`, the mean of d over the
-/// pixel's neighbourhood, stands for it, unless `d` itself is beyond doubt.
+/// The true D is not known. The measured `d` cannot replace it, because noise moves it away from 0 where D is 0.
+/// `around`, the mean of d over the pixel's neighbourhood, replaces it, unless `d` is clearly larger than the noise.
 pub fn fold(d: f64, around: f64, v: f64) -> f64 {
     if v <= 0.0 {
         return 0.0;
@@ -34,21 +36,27 @@ pub fn fold(d: f64, around: f64, v: f64) -> f64 {
     raised.max(0.0)
 }
 
-/// Whether [`relative_square`] knows its denominator t² + ε, with estimates of v and t² from the pixels around.
+/// Whether the noise is small enough for [`relative_square`] to correct the denominator. `v` and `t_squared` are
+/// estimates from the pixel's neighbourhood.
 pub fn is_continued(v: f64, t_squared: f64, epsilon: f64) -> bool {
     v <= MAX_CONTINUED * (t_squared.max(0.0) + epsilon)
 }
 
-/// d²/(r² + ε) and its first two derivatives in r, the value freed from noise in numerator and denominator.
+/// d²/(r² + ε) and its first two derivatives with respect to r. The value is corrected for the noise in numerator and
+/// denominator.
 ///
-/// For normal noise E[g(t + n + iσz)] over a standard normal z is g(t) wherever g can be continued so far into the complex plane
-/// (the heat equation run backwards); the Gauss–Hermite rule of three nodes is exact to the second order in v. For g = d² it
-/// gives d² − v. Where the noise is too large for that, what is left of it is taken from the numerator alone.
+/// The correction uses this identity: if n is normal noise and z an independent standard normal variable, E[g(t + n +
+/// iσz)] = g(t), provided that g can be continued that far into the complex plane (the heat equation run backwards).
+/// The mean over z is computed by the Gauss–Hermite rule of three nodes, which is exact to second order in v. For g =
+/// d² it gives d² − v.
+///
+/// If the noise is too large for this, the excess of the variance over the limit is subtracted from the numerator
+/// alone.
 pub fn relative_square(d: f64, r: f64, v: f64, epsilon: f64) -> (f64, f64, f64) {
     let w = r * r + epsilon;
     let g = d * d / w;
     let continued = v.min(MAX_CONTINUED * w);
-    // The outer nodes ±√3 have the weights 1/6 each and conjugate values.
+    // The outer nodes ±√3 have the weight 1/6 each, and their values are complex conjugates.
     let y = (3.0 * continued).sqrt();
     let (numerator, denominator) = ((d * d - y * y, -2.0 * d * y), (w - y * y, 2.0 * r * y));
     let size = denominator.0 * denominator.0 + denominator.1 * denominator.1;
@@ -78,7 +86,7 @@ mod tests {
             assert!((fold(0.0, d, v) - raised).abs() < 1e-5, "{d} {v}: {} {raised}", fold(0.0, d, v));
         }
         assert_eq!(fold(1.0, 1.0, 0.0), 0.0);
-        // Ten deviations among zeros are no noise.
+        // A difference of ten deviations among zeros is real and needs no correction.
         assert!(fold(10.0, 0.0, 1.0) < 1e-20);
     }
 
@@ -86,7 +94,7 @@ mod tests {
     fn relative_squares_keep_their_mean_under_noise() {
         for (e, t, epsilon) in [(1.2, 1.0, 0.01), (0.5, 1.0, 0.01), (3.0, 0.2, 0.05), (1.0, 1.0, 0.01)] {
             let exact = (e - t) * (e - t) / (t * t + epsilon);
-            // Noise of 10 % of the denominator's root; the first order that is left is the third, some tens of v³/w³ = 10⁻⁶.
+            // σ is 10 % of the denominator's root. The largest error is of third order, some tens of v³/w³ = 10⁻⁶.
             let v = 0.01 * (t * t + epsilon);
             let mean = expected(v, |n| relative_square(e - t - n, t + n, v, epsilon).0);
             assert!((mean - exact).abs() < 1e-4 * exact.max(1.0), "{e} {t}: {mean} {exact}");

@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
-/// Side of the square of pixels around each, px. Light changes little over it, and 25 squares of differences say well enough how
-/// large the difference is. The figures that depend on it state how far wrong it may make them.
+/// Side of the neighbourhood, pixels. Light changes little over it, and 25 squared differences determine their mean
+/// well enough. The figures that use it contain the error that this may cause in their standard error.
 const WINDOW: usize = 5;
 
-/// The mean of `value` over the pixels around each that are `used`; 0 where none is.
+/// For every pixel, the mean of `value` over the `used` pixels of its neighbourhood. 0 if none of them is used.
 pub fn window_means<const N: usize>(
     width: u32,
     height: u32,
@@ -35,7 +35,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn windows_end_at_the_edges_and_skip_what_is_not_used() {
+    fn windows_end_at_the_edges_and_skip_unused_pixels() {
         // Three rows of seven pixels with the values 0 to 20: the window covers all rows.
         let means = window_means(7, 3, |i| i != 8, |i| [i as f64, 1.0]);
         // Columns 0 to 2, without pixel 8: (0+1+2+7+9+14+15+16)/8.

@@ -1,5 +1,5 @@
-//! Typed reading of accessors: strided, sparse, normalised, quantised. Every bound is checked before anything is read,
-//! and nothing is allocated for elements that the file's bytes do not hold.
+//! Typed reading of accessors: strided, sparse, normalised, quantised. Every bound is checked before data is read, and
+//! memory is allocated only for elements that the file's bytes contain.
 
 use gltf::json::Index;
 use gltf::json::accessor::{Accessor as Definition, ComponentType, Type};
@@ -9,13 +9,13 @@ use super::buffers::Buffers;
 use super::document::Document;
 use crate::scene::error::{RE_EXPORT, SceneError};
 
-/// An accessor whose elements are all known to lie within their buffers.
+/// An accessor after its bounds have been checked: all its elements lie within their buffers.
 pub(super) struct Accessor<'a> {
     pub count: usize,
     pub components: usize,
     pub component_type: ComponentType,
     normalized: bool,
-    /// `None` reads as zeros.
+    /// `None` means that all elements are zero.
     base: Option<Strided<'a>>,
     sparse: Option<Sparse<'a>>,
     place: String,
@@ -35,7 +35,8 @@ struct Sparse<'a> {
 }
 
 impl<'a> Accessor<'a> {
-    /// Looks the accessor up and checks all its bounds. `place` leads the messages: `mesh 3 primitive 0: POSITION`.
+    /// Looks up the accessor and checks all its bounds. Error messages start with `place`, for example
+    /// `mesh 3 primitive 0: POSITION`.
     pub fn resolve(
         document: &Document,
         buffers: &'a Buffers,
@@ -48,10 +49,10 @@ impl<'a> Accessor<'a> {
         let (Checked::Valid(component), Checked::Valid(kind)) =
             (definition.component_type.as_ref(), definition.type_.as_ref())
         else {
-            return Err(invalid("its type or componentType is none of glTF's".to_owned()));
+            return Err(invalid("glTF does not define its type or componentType".to_owned()));
         };
         if matches!(kind, Type::Mat2 | Type::Mat3) {
-            return Err(invalid("nothing in a scene is a 2×2 or 3×3 matrix".to_owned()));
+            return Err(invalid("it holds 2×2 or 3×3 matrices, which no part of a scene uses".to_owned()));
         }
         let size = component.0.size() * kind.multiplicity();
         let count = definition.count.0;
@@ -61,9 +62,9 @@ impl<'a> Accessor<'a> {
                 let offset = definition.byte_offset.map_or(0, |offset| offset.0);
                 Some(strided(bytes, offset, stride, count, size).map_err(invalid)?)
             }
-            // Without data all elements are zero, and only the size of the input keeps the count in bounds.
+            // Without data all elements are zero, so no buffer bounds their number. The size of the input does instead.
             None if count > buffers.input_bytes => {
-                return Err(invalid(format!("{count} elements without data, in a file of fewer bytes")));
+                return Err(invalid(format!("it claims {count} elements without data, more than the file has bytes")));
             }
             None => None,
         };
@@ -82,30 +83,31 @@ impl<'a> Accessor<'a> {
         })
     }
 
-    /// Refuses an accessor whose element type is not one of `allowed` (numbers of components).
+    /// Refuses an accessor whose number of components is not one of `allowed`.
     pub fn expect_components(&self, document: &Document, allowed: &[usize]) -> Result<(), SceneError> {
         match allowed.contains(&self.components) {
             true => Ok(()),
             false => {
-                let what = format!("{} components where {allowed:?} belong", self.components);
+                let what = format!("it has {} components per element, not one of {allowed:?}", self.components);
                 Err(document.invalid(self.place.clone(), what, RE_EXPORT))
             }
         }
     }
 
-    /// Refuses an accessor that has not `count` elements.
+    /// Refuses an accessor whose number of elements is not `count`, which is that of `of`.
     pub fn expect_count(&self, document: &Document, count: usize, of: &str) -> Result<(), SceneError> {
         match self.count == count {
             true => Ok(()),
             false => {
-                let what = format!("{} elements, but {of} has {count}", self.count);
+                let what = format!("it has {} elements, but {of} has {count}", self.count);
                 Err(document.invalid(self.place.clone(), what, RE_EXPORT))
             }
         }
     }
 
-    /// All elements as floats; missing components take `fill`. `unsigned_is_normalized` for attributes whose integers
-    /// can only mean fractions (colours, weights), flag or not.
+    /// All elements as floats. Missing components are taken from `fill`. `unsigned_is_normalized` is for attributes
+    /// whose unsigned integers always mean fractions (colours, weights), even if the accessor lacks the flag
+    /// `normalized`.
     pub fn floats<const N: usize>(&self, fill: [f32; N], unsigned_is_normalized: bool) -> Vec<[f32; N]> {
         use ComponentType::{U8, U16};
         let normalized = self.normalized || (unsigned_is_normalized && matches!(self.component_type, U8 | U16));
@@ -117,7 +119,7 @@ impl<'a> Accessor<'a> {
         })
     }
 
-    /// All elements as unsigned integers; `None` when the accessor holds signed or floating-point numbers.
+    /// All elements as unsigned integers. `None` if the accessor holds signed or floating-point numbers.
     pub fn integers<const N: usize>(&self) -> Option<Vec<[u32; N]>> {
         let component_type = self.component_type;
         if !matches!(component_type, ComponentType::U8 | ComponentType::U16 | ComponentType::U32) {
@@ -149,7 +151,7 @@ impl<'a> Accessor<'a> {
     }
 }
 
-/// A 4×4 matrix of floats.
+/// Bytes of the largest element, a 4×4 matrix of floats.
 const MAX_ELEMENT_BYTES: usize = 64;
 
 impl<'a> Strided<'a> {
@@ -159,7 +161,7 @@ impl<'a> Strided<'a> {
     }
 }
 
-/// `count` elements of `size` bytes within `bytes` from `offset` on, or what is wrong.
+/// `count` elements of `size` bytes in `bytes`, starting at `offset`. The error describes the fault.
 fn strided(bytes: &[u8], offset: u64, stride: Option<usize>, count: u64, size: usize) -> Result<Strided<'_>, String> {
     let stride = stride.unwrap_or(size);
     if stride < size {
@@ -202,7 +204,7 @@ fn replacements<'a>(
     }
 }
 
-/// Little-endian bytes as an unsigned integer; `raw` is 1, 2 or 4 bytes long.
+/// The unsigned integer of little-endian bytes. `raw` holds 1, 2 or 4 of them.
 fn integer(raw: &[u8], component_type: ComponentType) -> u32 {
     match (component_type, raw) {
         (ComponentType::U8 | ComponentType::I8, [a, ..]) => u32::from(*a),
@@ -212,7 +214,8 @@ fn integer(raw: &[u8], component_type: ComponentType) -> u32 {
     }
 }
 
-/// glTF 2.0, section 3.6.2.2: c/255, c/65535, max(c/127, −1), max(c/32767, −1).
+/// The float value of a component. Normalised integers follow glTF 2.0, section 3.6.2.2: c/255, c/65535, max(c/127,
+/// −1), max(c/32767, −1).
 fn float(raw: &[u8], component_type: ComponentType, normalized: bool) -> f32 {
     let bits = integer(raw, component_type);
     let (value, one) = match component_type {

@@ -1,24 +1,26 @@
-//! The bytes behind buffers and buffer views.
+//! The bytes of buffers and buffer views.
 
 use std::borrow::Cow;
 use std::path::Path;
 
 use gltf::json::{Buffer, Index, buffer::View};
 
-use super::document::{Document, label};
+use super::document::Document;
 use super::extensions::{COMPRESSED_GEOMETRY, remedy};
 use super::inputs::{Inputs, Resource, resolve};
+use super::text::label;
 use crate::scene::error::{RE_EXPORT, SceneError};
 
-/// Content of every buffer of the file; `None` for those that have none (placeholders of compressed geometry).
+/// The content of all buffers of the file.
 pub(super) struct Buffers<'a> {
+    /// One entry per buffer. `None` for placeholders of compressed geometry, which have no content.
     contents: Vec<Option<Cow<'a, [u8]>>>,
-    /// Bytes of all inputs: nothing in a file can hold more elements than this.
+    /// Bytes of all inputs together. It bounds the number of elements of any list.
     pub input_bytes: u64,
 }
 
 impl<'a> Buffers<'a> {
-    /// Reads every buffer; `bin` is the GLB file's binary chunk.
+    /// Reads all buffers. `bin` is the binary chunk of the GLB file.
     pub fn load(document: &Document, bin: Option<&'a [u8]>, inputs: &mut Inputs) -> Result<Buffers<'a>, SceneError> {
         let folder = document.file.parent().unwrap_or(Path::new(""));
         let mut contents = Vec::with_capacity(document.buffers.len());
@@ -61,7 +63,7 @@ impl<'a> Buffers<'a> {
                 ),
             });
         };
-        // The buffer's own byteLength binds too: what lies behind it is padding.
+        // Bytes beyond the buffer's byteLength are padding and do not count.
         let available = (content.len() as u64).min(buffer.byte_length.0);
         let start = view.byte_offset.map_or(0, |offset| offset.0);
         match start.checked_add(view.byte_length.0) {

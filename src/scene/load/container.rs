@@ -1,4 +1,5 @@
-//! GLB, the binary container of glTF: header, JSON chunk, optional BIN chunk. A file without its magic is JSON text.
+//! GLB, the binary container of glTF: header, JSON chunk, optional BIN chunk. A file that does not start with GLB's
+//! magic bytes is JSON text.
 
 use std::ops::Range;
 
@@ -6,20 +7,20 @@ const MAGIC: &[u8; 4] = b"glTF";
 const CHUNK_JSON: &[u8; 4] = b"JSON";
 const CHUNK_BIN: &[u8; 4] = b"BIN\0";
 
-/// Where the parts lie in the file's bytes.
+/// The ranges of the parts within the file's bytes.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Parts {
     pub json: Range<usize>,
     pub bin: Option<Range<usize>>,
 }
 
-/// Finds JSON and binary chunk. The error says what is wrong.
+/// Finds the JSON chunk and the binary chunk. The error describes the fault.
 ///
-/// The header's total length is not believed: a longer file has harmless bytes at its end, and a shorter one shows at
-/// the chunk that is cut off.
+/// The total length in the header is ignored. If the file is longer, the extra bytes are harmless; if it is shorter, a
+/// chunk is cut off and gives the error.
 pub(super) fn split(bytes: &[u8]) -> Result<Parts, String> {
     if !bytes.starts_with(MAGIC) {
-        // A byte order mark is not JSON, but editors write it.
+        // A byte order mark is not part of JSON, but some editors write it.
         let start = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
         return Ok(Parts { json: start..bytes.len(), bin: None });
     }
@@ -29,10 +30,11 @@ pub(super) fn split(bytes: &[u8]) -> Result<Parts, String> {
     }
     let json = chunk(bytes, 12, CHUNK_JSON)?.ok_or("the GLB file has no JSON chunk")?;
     let end = json.end;
-    // NUL padding is wrong but common.
+    // The specification pads the JSON with spaces. Padding with NUL is common too.
     let trimmed = bytes[json.clone()].iter().rposition(|b| !matches!(b, 0 | b' ')).map_or(0, |last| last + 1);
     let json = json.start..json.start + trimmed;
-    // Chunks start at multiples of four; writers that forget the padding start the next one at once.
+    // Chunks start at multiples of four. Some writers omit the padding, so the next chunk may start right behind the
+    // JSON.
     let padded = end.next_multiple_of(4);
     let bin = match chunk(bytes, padded, CHUNK_BIN)? {
         None if padded != end => chunk(bytes, end, CHUNK_BIN)?,
@@ -46,7 +48,7 @@ fn word(bytes: &[u8], at: usize) -> Option<u32> {
     Some(u32::from_le_bytes(raw.try_into().ok()?))
 }
 
-/// The data of the chunk at `at`, if it is of that kind.
+/// The range of the data of the chunk at byte `at`. `None` if there is no chunk of this kind.
 fn chunk(bytes: &[u8], at: usize, kind: &[u8; 4]) -> Result<Option<Range<usize>>, String> {
     let Some(length) = word(bytes, at) else { return Ok(None) };
     if bytes.get(at + 4..at + 8) != Some(kind) {

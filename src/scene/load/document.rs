@@ -1,8 +1,9 @@
-//! The glTF JSON, taken apart element by element so that a message can name the element that is wrong.
+//! The glTF JSON, parsed element by element, so that an error message can name the faulty element.
 //!
-//! The types are the `gltf` crate's. Its own validation and readers are not used: validation panics on a POSITION
-//! accessor that does not exist and refuses files that only lack `min`/`max`; the readers trust the counts they find.
-//! Instead every index is looked up with a check where it is followed, so what nothing refers to cannot fail a load.
+//! The types come from the `gltf` crate. Its validation is not used: it panics on a POSITION accessor that does not
+//! exist, and it refuses files that only lack `min`/`max`. Its readers are not used either, because they trust the
+//! counts in the file. Instead every index is checked when it is followed. Faults in elements that nothing refers to
+//! are ignored.
 
 use std::path::{Path, PathBuf};
 
@@ -14,9 +15,11 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
 use super::extensions;
+use super::text::sentence;
 use crate::scene::error::{RE_EXPORT, SceneError};
 
-/// No real scene comes near; a JSON list of `{}` grows a hundredfold when parsed into typed elements.
+/// Most elements of a JSON list. Real scenes stay far below. The limit is needed because a list of `{}` takes a hundred
+/// times its size when it is parsed into typed elements.
 const MAX_ELEMENTS: usize = 1 << 20;
 
 pub(super) struct Document {
@@ -40,7 +43,7 @@ pub(super) struct Document {
 }
 
 impl Document {
-    /// Parses the JSON and refuses versions and required extensions that the loader does not know.
+    /// Parses the JSON. Refuses versions and required extensions that the loader does not read.
     pub fn parse(file: &Path, json: &[u8], warnings: &mut Vec<String>) -> Result<Document, SceneError> {
         let format = |what: String, remedy| SceneError::Format { file: file.to_owned(), what, remedy };
         let root: Value = serde_json::from_slice(json)
@@ -83,12 +86,12 @@ impl Document {
         })
     }
 
-    /// An error about what is wrong at `place`.
+    /// The error for the fault `what` at `place`.
     pub fn invalid(&self, place: impl Into<String>, what: impl Into<String>, remedy: &'static str) -> SceneError {
         SceneError::Invalid { file: self.file.clone(), place: place.into(), what: what.into(), remedy }
     }
 
-    /// The element that `place` refers to, or an error that it does not exist.
+    /// The element `index` of `list`, to which `place` refers. The error says that it does not exist.
     pub fn get<'a, T>(
         &self,
         list: &'a [T],
@@ -103,39 +106,14 @@ impl Document {
     }
 }
 
-/// `kind index 'name'`, safe to print on one line.
-pub(super) fn label(kind: &str, index: usize, name: Option<&str>) -> String {
-    match name {
-        None | Some("") => format!("{kind} {index}"),
-        Some(name) => format!("{kind} {index} '{}'", short(name)),
-    }
-}
-
-/// A name as it may stand in a one-line message.
-pub(super) fn short(name: &str) -> String {
-    const MAX_CHARS: usize = 60;
-    let cut: String = name.chars().take(MAX_CHARS).collect();
-    let dots = if cut.len() < name.len() { "…" } else { "" };
-    format!("{}{dots}", cut.escape_debug())
-}
-
-/// A message from a parser or decoder, on one line; a long one ends after a whole word.
-pub(super) fn sentence(message: &str) -> String {
-    const MAX_CHARS: usize = 240;
-    let line = message.split_whitespace().collect::<Vec<_>>().join(" ");
-    let Some((end, _)) = line.char_indices().nth(MAX_CHARS) else { return line.escape_debug().to_string() };
-    let kept = line[..end].rsplit_once(' ').map_or(&line[..end], |(kept, _)| kept);
-    format!("{} …", kept.escape_debug())
-}
-
 #[derive(serde::Deserialize)]
 struct SceneRoots {
-    /// Absent in files of some exporters, although `gltf::json` requires it.
+    /// Some exporters omit this list. The type in `gltf::json` requires it, so it is not used.
     #[serde(default)]
     nodes: Vec<u32>,
 }
 
-/// The root object while its lists are taken out of it.
+/// The root object, from which the lists are taken one after the other.
 struct Sections<'a> {
     file: &'a Path,
     root: &'a mut Map<String, Value>,

@@ -1,4 +1,4 @@
-//! Which primitive is drawn where: nodes with meshes, their GPU instances and their skins.
+//! The list of what is drawn: each primitive with each place at which nodes, GPU instances or skins put it.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -8,8 +8,8 @@ use gltf::json::Node;
 use super::buffers::Buffers;
 use super::document::Document;
 use super::nodes::{Nodes, node_label};
-use super::places::{instances, skeleton};
-use super::primitive::{self, Primitive, Size, Skipped};
+use super::places::{Place, instances, skeleton};
+use super::primitive::{self, MeshSize, Primitive, Skipped};
 use super::transform::{Placement, WorldPoint};
 use crate::scene::error::{RE_EXPORT, SceneError};
 
@@ -18,12 +18,6 @@ pub(super) struct Draw {
     /// Index into [`Draws::primitives`].
     pub primitive: usize,
     pub place: Place,
-}
-
-pub(super) enum Place {
-    Rigid(Placement),
-    /// Index into [`Draws::skeletons`].
-    Skinned(usize),
 }
 
 /// Everything that is drawn.
@@ -37,19 +31,20 @@ pub(super) struct Draws {
     pub skipped: Skipped,
 }
 
-/// Instances are written out, so a small file may ask for a huge scene. Up to this many vertices or triangles, or as
-/// many as the input has bytes (every scene without instances stays below that), memory stays under 1 GiB for small
-/// inputs: 72 bytes a vertex in memory, 16 a triangle.
+/// Most vertices of a scene, or as many as the input has bytes if that is more. The limit is needed because each
+/// instance gets its own copy of its mesh, so a small file can ask for a huge scene. Scenes without instances never
+/// reach it. At 72 bytes per vertex and 16 per triangle a small file takes less than 1 GiB.
 const MAX_VERTICES: u64 = 1 << 23;
+/// Most triangles of a scene, likewise.
 const MAX_TRIANGLES: u64 = 1 << 24;
-/// Primitives × instances, 128 bytes each.
+/// Most pairs of primitive and instance, likewise. Each takes 128 bytes.
 const MAX_DRAWS: u64 = 1 << 20;
 
 impl Draws {
     /// Reads the meshes of all visible nodes.
     pub fn collect(document: &Document, buffers: &Buffers, nodes: &Nodes) -> Result<Draws, SceneError> {
         let mut draws = Draws::default();
-        let mut sizes: HashMap<usize, Size> = HashMap::new();
+        let mut sizes: HashMap<usize, MeshSize> = HashMap::new();
         let mut decoded: HashMap<usize, Range<usize>> = HashMap::new();
         let mut total = Total::default();
         for &index in &nodes.visible {
@@ -61,7 +56,7 @@ impl Draws {
             let mesh_index = mesh_index.value();
             let size = match sizes.get(&mesh_index) {
                 Some(size) => *size,
-                None => *sizes.entry(mesh_index).or_insert(primitive::size(document, buffers, mesh_index, mesh)?),
+                None => *sizes.entry(mesh_index).or_insert(primitive::mesh_size(document, buffers, mesh_index, mesh)?),
             };
             total.add(document, buffers, index, size, places.len())?;
 
@@ -80,7 +75,7 @@ impl Draws {
         Ok(draws)
     }
 
-    /// A point of the world near the geometry: where the first thing drawn stands.
+    /// A point of the world near the geometry: the position of the first draw.
     pub fn landmark(&self) -> Option<WorldPoint> {
         let first = self.draws.first()?;
         let placement = match first.place {
@@ -98,7 +93,7 @@ impl Draws {
                     check_influences(document, content, self.skeletons[skeleton].len())?;
                     Place::Skinned(skeleton)
                 }
-                // Joints and weights absent: nothing moves it, so it stays where the first joint would carry it.
+                // The primitive has no joints and weights. It follows the first joint of the skin.
                 Place::Skinned(skeleton) => Place::Rigid(self.skeletons[skeleton][0]),
                 Place::Rigid(placement) => Place::Rigid(placement),
             };
@@ -135,21 +130,21 @@ impl Draws {
     }
 }
 
-/// What the scene will hold once all instances are written out.
+/// The size of the scene after each instance has got its own copy of its mesh.
 #[derive(Default)]
 struct Total {
-    size: Size,
+    size: MeshSize,
     draws: u64,
 }
 
 impl Total {
-    /// Counts a mesh drawn at so many places; an error when the sum is out of proportion to the input.
+    /// Adds a mesh that is drawn at `places` places. Fails if the sum exceeds the limits.
     fn add(
         &mut self,
         document: &Document,
         buffers: &Buffers,
         node: usize,
-        mesh: Size,
+        mesh: MeshSize,
         places: usize,
     ) -> Result<(), SceneError> {
         let places = places as u64;
@@ -163,11 +158,13 @@ impl Total {
         {
             return Ok(());
         }
-        let Size { vertices, triangles, .. } = self.size;
+        let MeshSize { vertices, triangles, .. } = self.size;
         Err(SceneError::TooLarge {
             file: document.file.clone(),
             place: node_label(document, node),
-            what: format!("written out, the scene has {vertices} vertices and {triangles} triangles or more"),
+            what: format!(
+                "with all its instances the scene has at least {vertices} vertices and {triangles} triangles"
+            ),
             remedy: "draw fewer instances or simplify the mesh",
         })
     }

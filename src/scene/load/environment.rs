@@ -7,19 +7,20 @@ use glam::Vec3;
 use image::codecs::hdr::HdrDecoder;
 use image::{DynamicImage, ImageDecoder};
 
-use super::document::sentence;
 use super::inputs::Inputs;
+use super::text::sentence;
 use crate::scene::environment::{Environment, EnvironmentMap};
 use crate::scene::error::SceneError;
 use crate::scene::options::EnvironmentSource;
 
-/// 8192 × 4096: 384 MiB of texels.
+/// Most texels of a map: 8192 × 4096, which take 384 MiB.
 const MAX_TEXELS: u64 = 1 << 25;
-/// A run-length-coded black sky is small; what is larger must have as many bytes as this share of its texels.
+/// Maps up to this many texels are accepted from a file of any size, because a compressed black sky is small.
 const MAX_UNBACKED_TEXELS: u64 = 1 << 22;
+/// Most texels per byte of the file in larger maps.
 const MAX_RATIO: u64 = 64;
 
-/// Loads the sky. Texels that are negative or not finite become 0, with a warning that counts them.
+/// Loads the sky. Texels that are negative or not finite become 0; a warning gives their number.
 pub(super) fn load(
     source: Option<&EnvironmentSource>,
     inputs: &mut Inputs,
@@ -69,7 +70,7 @@ fn decode(path: &Path, bytes: &[u8]) -> Result<EnvironmentMap, SceneError> {
     })
 }
 
-/// Why a map was not decoded.
+/// The reason why a map was not decoded.
 enum Failure {
     Broken(String),
     TooLarge(String),
@@ -83,7 +84,7 @@ fn check_size(width: u64, height: u64, bytes: &[u8]) -> Result<(), Failure> {
         Some(0) => Err(Failure::Broken("it has no pixels".to_owned())),
         Some(texels) if texels <= allowed => Ok(()),
         _ => Err(Failure::TooLarge(format!(
-            "{width}×{height} pixels are more than the {allowed} that are read of a file of {} bytes",
+            "it has {width}×{height} pixels; a file of {} bytes may have at most {allowed}",
             bytes.len()
         ))),
     }

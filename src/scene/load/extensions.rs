@@ -1,13 +1,13 @@
-//! Which glTF extensions are read, which only change what this project does not model, and what to do about the rest.
+//! The glTF extensions: those that are read, those that may be ignored, and the remedies for all others.
 
 use std::path::Path;
 
 use serde_json::{Map, Value};
 
-use super::document::short;
+use super::text::short;
 use crate::scene::error::SceneError;
 
-/// Extensions whose meaning the loader carries out.
+/// Extensions that the loader implements.
 const READ: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
@@ -18,8 +18,8 @@ const READ: &[&str] = &[
     "KHR_texture_transform",
 ];
 
-/// Extensions that may be required and still be left out with a warning: without them a scene has the same shape and
-/// nearly the same diffuse light.
+/// Extensions that are ignored with a warning even if the file requires them. Without them the scene keeps its shape,
+/// and its diffuse light hardly changes.
 const APPROXIMATED: &[&str] = &[
     "KHR_animation_pointer",
     "KHR_materials_anisotropy",
@@ -37,14 +37,15 @@ const APPROXIMATED: &[&str] = &[
     "KHR_xmp_json_ld",
 ];
 
-/// Compressed geometry, and how to undo it. `gltf-transform copy` decodes on reading and writes plain data.
+/// Extensions of compressed geometry.
 pub(super) const COMPRESSED_GEOMETRY: &[&str] =
     &["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
-/// Image formats that are not decoded.
+/// Extensions of image formats that are not decoded.
 pub(super) const COMPRESSED_IMAGES: &[&str] =
     &["KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds"];
 
-/// What to do about an extension that is not read.
+/// The advice to a user whose file needs an extension that is not read. `gltf-transform copy` decodes compressed
+/// geometry and writes plain data.
 pub(super) fn remedy(extension: &str) -> &'static str {
     match extension {
         "KHR_draco_mesh_compression" => "decode it with `gltf-transform copy IN.glb OUT.glb`",
@@ -60,7 +61,7 @@ pub(super) fn remedy(extension: &str) -> &'static str {
     }
 }
 
-/// Refuses a file that requires an extension which is neither read nor approximated.
+/// Refuses a file that requires an extension which is neither in [`READ`] nor in [`APPROXIMATED`].
 pub(super) fn check_required(
     file: &Path,
     root: &Map<String, Value>,

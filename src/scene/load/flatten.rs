@@ -1,22 +1,23 @@
-//! All draws written out into one vertex pool, recentred about the middle of the scene.
+//! Copies all draws into one list of vertices, with positions relative to the middle of the scene.
 //!
-//! Positions are computed in f64 relative to a landmark in the scene, their bounding box gives the centre, and only
-//! `(A·p + (t − landmark)) − centre` is rounded to f32. Nothing here depends on where in the world the scene stands.
+//! Positions are computed in f64 relative to a landmark, a point in the scene. Their bounding box gives the centre.
+//! Only the final `(A·p + (t − landmark)) − centre` is rounded to f32. So the result does not depend on the scene's
+//! position in the world.
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::draws::Draws;
-use super::places::Poses;
+use super::poses::Poses;
 use super::primitive::Primitive;
 use super::transform::{Pose, WorldPoint, is_mirrored, normal_matrix};
 use crate::scene::{DroppedTriangles, MaterialIndex, Mesh};
 
-/// Coordinates beyond this many metres from the landmark count as infinite: their squares no longer fit f32 with room
-/// for a sum.
+/// Coordinates farther than this from the landmark, in metres, count as infinite. Sums of larger squares could overflow
+/// f32.
 const MAX_COORDINATE_M: f64 = 1e18;
 
-/// Triangles lower than this share of their longest edge have no area: ε of f32, the relative rounding of a vertex,
-/// is 1.2e-7, so that such a triangle's normal would be noise.
+/// Least height of a triangle as a share of its longest edge. A lower triangle counts as having no area: f32 rounds its
+/// vertices by a share of 1.2e-7, so its normal would be noise.
 const MIN_HEIGHT: f64 = 1e-7;
 
 pub(super) struct Flattened {
@@ -26,13 +27,13 @@ pub(super) struct Flattened {
     pub dropped: DroppedTriangles,
 }
 
-/// How materials matter to the order of triangles.
+/// What the flattening needs to know about materials, to put opaque triangles first.
 pub(super) trait MaterialOf {
-    /// The material of a primitive, and whether it needs an alpha test.
+    /// The material of a primitive, and whether that material needs an alpha test.
     fn of(&self, primitive: &Primitive) -> (MaterialIndex, bool);
 }
 
-/// Writes out every draw, opaque triangles first, otherwise in the order of the scene.
+/// Copies every draw. Opaque triangles come first; otherwise the order is that of the scene.
 pub(super) fn flatten(draws: &Draws, landmark: &WorldPoint, materials: &impl MaterialOf) -> Flattened {
     let centre = centre(draws, landmark);
     let has = |list: fn(&Primitive) -> bool| draws.primitives.iter().any(list);
@@ -58,7 +59,7 @@ pub(super) fn flatten(draws: &Draws, landmark: &WorldPoint, materials: &impl Mat
     Flattened { mesh, centre, dropped }
 }
 
-/// Middle of the bounding box of all finite triangles, relative to the landmark.
+/// Middle of the bounding box of all triangles with finite corners, relative to the landmark.
 fn centre(draws: &Draws, landmark: &WorldPoint) -> DVec3 {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for draw in &draws.draws {
@@ -129,7 +130,7 @@ impl Pool {
                 }
                 pooled[vertex as usize]
             });
-            // A mirrored triangle would show its back where the original shows its front.
+            // Mirroring reverses the winding. Swapping two corners restores it, so that fronts stay fronts.
             if mirrored > 0 {
                 wound.swap(1, 2);
             }
@@ -143,7 +144,7 @@ impl Pool {
     }
 
     fn recentred(&self, point: DVec3) -> Vec3 {
-        // + 0.0 turns −0 into +0, so that no bit depends on how zero came about.
+        // + 0.0 turns −0 into +0, so the bits of zero do not depend on the computation before it.
         ((point - self.centre) + DVec3::ZERO).as_vec3()
     }
 
@@ -168,7 +169,8 @@ impl Pool {
     }
 }
 
-/// Tangents lie in the surface, so they move like edges; mirroring turns the handedness of their frame.
+/// The tangent in world space. Tangents lie in the surface, so they transform like edges. Mirroring reverses the
+/// handedness of their frame.
 fn moved_tangent(tangent: Vec4, pose: &Pose) -> Vec4 {
     let local = tangent.truncate().as_dvec3().normalize_or_zero();
     let direction = (pose.linear * local).normalize_or_zero().as_vec3();

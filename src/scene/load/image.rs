@@ -1,4 +1,4 @@
-//! Decoding of texture images (PNG and JPEG), with their size checked before a pixel is allocated.
+//! Decoding of texture images (PNG and JPEG). Their size is checked before memory is allocated.
 
 use std::io::Cursor;
 
@@ -7,14 +7,16 @@ use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Lim
 
 use crate::scene::material::Texels;
 
-/// Width and height, pixels.
+/// Most pixels of an image's width and of its height.
 const MAX_SIDE: u32 = 16384;
-/// Decoded textures of a scene may hold this many bytes, or [`MAX_RATIO`] times their files' bytes: a JPEG of half a
-/// bit per pixel grows 64-fold, while a PNG made to harm grows a thousandfold. Twice the budget is held for a moment.
+/// The decoded textures of a scene may take this many bytes, or [`MAX_RATIO`] × the bytes of their files if that is
+/// more. While an image is being converted, memory can reach twice this budget.
 const MIN_BUDGET: u64 = 384 << 20;
+/// Most decoded bytes per byte of a file. A JPEG with half a bit per pixel grows 64-fold; a malicious PNG can grow a
+/// thousandfold.
 const MAX_RATIO: u64 = 64;
 
-/// What decoded images may still take up.
+/// Counts the bytes of images, to bound the memory of decoded ones.
 pub(super) struct Budget {
     encoded: u64,
     decoded: u64,
@@ -27,7 +29,7 @@ pub(super) struct Decoded {
     pub texels: Texels,
 }
 
-/// Why an image was not decoded.
+/// The reason why an image was not decoded.
 pub(super) enum Failure {
     /// The format belongs to this extension, which is not read.
     Extension(&'static str),
@@ -40,7 +42,7 @@ impl Budget {
         Budget { encoded: 0, decoded: 0 }
     }
 
-    /// Decodes an image. RGB is marked as sRGB where `srgb` says so; alpha is linear always.
+    /// Decodes an image. `srgb` tells whether its RGB is sRGB-encoded; alpha is always linear.
     pub fn decode(&mut self, bytes: &[u8], srgb: bool) -> Result<Decoded, Failure> {
         let format = recognise(bytes)?;
         let broken = |e: image::ImageError| Failure::Broken(format!("it does not decode: {e}"));
@@ -57,8 +59,8 @@ impl Budget {
         let budget = MIN_BUDGET.max(self.encoded.saturating_mul(MAX_RATIO));
         if width > MAX_SIDE || height > MAX_SIDE || self.decoded.saturating_add(size) > budget {
             return Err(Failure::TooLarge(format!(
-                "{width}×{height} pixels would bring the decoded textures to {} MiB, of {} MiB allowed (and {MAX_SIDE} \
-                 pixels a side)",
+                "with its {width}×{height} pixels the decoded textures would take {} MiB; at most {} MiB and {MAX_SIDE} \
+                 pixels per side are allowed",
                 (self.decoded + size) >> 20,
                 budget >> 20
             )));
@@ -72,7 +74,7 @@ impl Budget {
         Ok(Decoded { width, height, texels: texels(image, is_deep, srgb) })
     }
 
-    /// Gives back the bytes of texels that were dropped again.
+    /// Gives back the bytes of texels that the caller has dropped.
     pub fn release(&mut self, texels: u64, bytes_per_texel: u64) {
         self.decoded = self.decoded.saturating_sub(texels * bytes_per_texel);
     }
@@ -87,7 +89,7 @@ fn recognise(bytes: &[u8]) -> Result<ImageFormat, Failure> {
         Ok(ImageFormat::WebP) => Err(Failure::Extension("EXT_texture_webp")),
         Ok(ImageFormat::Avif) => Err(Failure::Extension("EXT_texture_avif")),
         Ok(ImageFormat::Dds) => Err(Failure::Extension("MSFT_texture_dds")),
-        Ok(other) => Err(Failure::Broken(format!("it is {other:?}, and glTF has PNG and JPEG only"))),
+        Ok(other) => Err(Failure::Broken(format!("its format is {other:?}, but glTF allows only PNG and JPEG"))),
         Err(_) => Err(Failure::Broken("it is neither PNG nor JPEG".to_owned())),
     }
 }
@@ -105,7 +107,7 @@ fn texels(image: DynamicImage, is_deep: bool, srgb: bool) -> Texels {
     Texels::Rgba32F(rgba.pixels().map(|p| texel(p.0)).collect())
 }
 
-/// IEC 61966-2-1, on [0, 1].
+/// The linear value of an sRGB code in [0,1] (IEC 61966-2-1).
 fn linear_from_srgb(c: f32) -> f32 {
     if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }

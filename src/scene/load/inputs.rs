@@ -1,4 +1,4 @@
-//! Reading the files of a scene; every byte read goes into the scene's hash.
+//! Reading the files of a scene. All bytes read enter the scene's hash.
 
 use std::borrow::Cow;
 use std::io;
@@ -11,18 +11,18 @@ use percent_encoding::percent_decode_str;
 
 use crate::system::input::read_file;
 
-/// Files read so far, and the hash over them in the order of reading.
+/// The files read so far, and the hash over them in the order of reading.
 pub(super) struct Inputs {
     hasher: blake3::Hasher,
-    /// Bytes of all files read: what a damaged header's counts are held against.
+    /// Bytes of all files read. Counts in a damaged header are checked against it.
     pub bytes: u64,
-    /// Their paths.
+    /// Paths of the files read.
     pub files: Vec<PathBuf>,
 }
 
-/// Where a glTF `uri` leads.
+/// The target of a glTF `uri`.
 pub(super) enum Resource {
-    /// The content of a data URI; part of the scene file's bytes already.
+    /// The content of a data URI. The hash contains it already as part of the scene file.
     Data(Vec<u8>),
     File(PathBuf),
 }
@@ -32,7 +32,7 @@ impl Inputs {
         Inputs { hasher: blake3::Hasher::new(), bytes: 0, files: Vec::new() }
     }
 
-    /// The whole of a regular file.
+    /// Reads a regular file.
     pub fn read(&mut self, path: &Path) -> io::Result<Vec<u8>> {
         let bytes = read_file(path)?;
         self.add(&bytes);
@@ -40,20 +40,20 @@ impl Inputs {
         Ok(bytes)
     }
 
-    /// Takes bytes that did not come from a file into the hash, after their length so that no two inputs run together.
+    /// Adds bytes to the hash. Their length goes first, so that inputs cut at another place give another hash.
     pub fn add(&mut self, bytes: &[u8]) {
         self.hasher.update(&(bytes.len() as u64).to_le_bytes());
         self.hasher.update(bytes);
         self.bytes += bytes.len() as u64;
     }
 
-    /// BLAKE3 in hex.
+    /// The BLAKE3 hash in hexadecimal.
     pub fn finish(&self) -> String {
         self.hasher.finalize().to_hex().to_string()
     }
 }
 
-/// Padding is optional and stray low bits are let through: exporters differ, and nothing is lost by it.
+/// Base64 that accepts missing padding and stray low bits. Exporters differ in both, and neither changes the data.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &alphabet::STANDARD,
     GeneralPurposeConfig::new()
@@ -61,26 +61,28 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
         .with_decode_allow_trailing_bits(true),
 );
 
-/// Resolves a glTF `uri` against the folder of the scene file. The error says what is wrong with the URI.
+/// Resolves a glTF `uri` relative to the folder of the scene file. The error describes the fault of the URI.
 pub(super) fn resolve(uri: &str, folder: &Path) -> Result<Resource, String> {
     if let Some(rest) = uri.strip_prefix("data:") {
         let Some((kind, content)) = rest.split_once(',') else {
-            return Err("a data URI without a comma".to_owned());
+            return Err("its data URI has no comma".to_owned());
         };
         let plain: Cow<[u8]> = percent_decode_str(content).into();
         return match kind.ends_with(";base64") {
-            true => BASE64.decode(&plain).map(Resource::Data).map_err(|e| format!("a data URI of bad base64 ({e})")),
+            true => {
+                BASE64.decode(&plain).map(Resource::Data).map_err(|e| format!("its data URI is not valid base64 ({e})"))
+            }
             false => Ok(Resource::Data(plain.into_owned())),
         };
     }
     if let Some((scheme, _)) = uri.split_once("://") {
-        return Err(format!("a URI of scheme '{}', not a relative path", scheme.escape_debug()));
+        return Err(format!("its URI has the scheme '{}'; only relative paths are read", scheme.escape_debug()));
     }
-    let decoded = percent_decode_str(uri).decode_utf8().map_err(|_| "a URI that is not UTF-8".to_owned())?;
+    let decoded = percent_decode_str(uri).decode_utf8().map_err(|_| "its URI is not UTF-8".to_owned())?;
     if decoded.is_empty() || decoded.contains('\0') {
-        return Err("an empty or malformed URI".to_owned());
+        return Err("its URI is empty or malformed".to_owned());
     }
-    // Some exporters forget to encode: a literal '%' in a file's name.
+    // Some exporters do not percent-encode, so a '%' may be part of the file's name.
     let (encoded, decoded) = (folder.join(uri), folder.join(&*decoded));
     Ok(Resource::File(if !decoded.exists() && encoded.exists() { encoded } else { decoded }))
 }

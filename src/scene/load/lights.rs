@@ -1,4 +1,4 @@
-//! Punctual lights and cameras where their nodes stand. Both keep their size whatever the nodes' scale is.
+//! Punctual lights and cameras at the positions of their nodes. The scale of a node does not affect them.
 
 use std::collections::HashSet;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
@@ -8,31 +8,33 @@ use gltf::json::extensions::scene::khr_lights_punctual::{Light, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Camera as CameraDefinition, camera::Type as CameraType};
 
-use super::document::{Document, label, short};
+use super::document::Document;
 use super::nodes::{Nodes, node_label};
+use super::text::{label, short};
 use super::transform::{Pose, WorldPoint};
 use crate::scene::camera::Projection;
 use crate::scene::error::{RE_EXPORT, SceneError};
 use crate::scene::{Camera, LightKind, PunctualLight};
 
-/// Where stored positions are relative to: `centre` from the landmark.
-pub(super) struct Origin<'a> {
+/// The point to which the scene's positions are relative: landmark + centre.
+pub(super) struct SceneOrigin<'a> {
     pub landmark: &'a WorldPoint,
+    /// Relative to the landmark.
     pub centre: DVec3,
 }
 
-impl Origin<'_> {
+impl SceneOrigin<'_> {
     fn position(&self, pose: &Pose) -> Vec3 {
-        // + 0.0 turns −0 into +0, as for vertices.
+        // + 0.0 turns −0 into +0, as it does for vertices.
         ((pose.offset - self.centre) + DVec3::ZERO).as_vec3()
     }
 }
 
-/// `KHR_lights_punctual` lights of the visible nodes.
+/// The lights of the visible nodes (`KHR_lights_punctual`).
 pub(super) fn lights(
     document: &Document,
     nodes: &Nodes,
-    origin: &Origin,
+    origin: &SceneOrigin,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<PunctualLight>, SceneError> {
     let mut lights = Vec::new();
@@ -102,16 +104,16 @@ fn kind(
             }
             Ok(LightKind::Spot { position, direction, range_m, inner_cone_rad, outer_cone_rad })
         }
-        Checked::Invalid => Err(document.invalid(place, "its type is none of the extension's", RE_EXPORT)),
+        Checked::Invalid => Err(document.invalid(place, "KHR_lights_punctual does not define its type", RE_EXPORT)),
     }
 }
 
-/// Cameras of the visible nodes, with names made unique. One that cannot be used is left out with a warning: bakes do
-/// without.
+/// The cameras of the visible nodes, with unique names. A camera that cannot be used is left out with a warning and is
+/// no error, because a bake needs no camera.
 pub(super) fn cameras(
     document: &Document,
     nodes: &Nodes,
-    origin: &Origin,
+    origin: &SceneOrigin,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Camera>, SceneError> {
     let mut cameras: Vec<Camera> = Vec::new();
@@ -135,7 +137,7 @@ pub(super) fn cameras(
     Ok(cameras)
 }
 
-/// The name, or the first of `name#2`, `name#3`, … that is free.
+/// The name itself if it is free, or the first free one of `name#2`, `name#3`, ….
 fn unique(name: String, taken: &mut HashSet<String>) -> String {
     let mut candidate = name.clone();
     let mut number = 1;
@@ -146,7 +148,8 @@ fn unique(name: String, taken: &mut HashSet<String>) -> String {
     candidate
 }
 
-/// Right, up, back of the node, made orthonormal; `None` where the transform leaves no view direction or no up.
+/// The node's right, up and back vectors, made orthonormal. `None` if the transform has no view direction or no up
+/// vector.
 fn frame(pose: &Pose) -> Option<Mat3> {
     let back = pose.linear.z_axis.try_normalize()?;
     let right = pose.linear.y_axis.try_normalize()?.cross(back).try_normalize()?;

@@ -1,4 +1,4 @@
-//! Materials in use, with their textures; alpha modes that change nothing become opaque.
+//! The materials in use, with their textures. Alpha modes without effect become opaque.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,19 +8,20 @@ use gltf::json::material::AlphaMode as DefinedAlpha;
 use gltf::json::validation::Checked;
 use serde_json::Value;
 
-use super::document::{Document, label, short};
+use super::document::Document;
 use super::draws::Draws;
 use super::flatten::MaterialOf;
 use super::primitive::Primitive;
+use super::text::{label, short};
 use super::texture_slot::{Slot, slot};
 use super::textures::Textures;
 use crate::scene::error::{RE_EXPORT, SceneError};
 use crate::scene::{AlphaMode, Material, MaterialIndex, TextureRef};
 
-/// The materials of everything drawn.
+/// The materials of all draws.
 pub(super) struct Materials {
     pub materials: Vec<Material>,
-    /// By glTF index; `None` is the default material.
+    /// From the glTF index, where `None` is the default material.
     indices: BTreeMap<Option<usize>, MaterialIndex>,
 }
 
@@ -75,7 +76,7 @@ impl Materials {
     }
 }
 
-/// Names of materials by what was done to them.
+/// For each change that the loader made to materials, the names of those materials.
 #[derive(Default)]
 struct Notes(BTreeMap<&'static str, BTreeSet<String>>);
 
@@ -102,7 +103,6 @@ fn read(
     textures: &mut Textures,
     notes: &mut Notes,
 ) -> Result<Material, SceneError> {
-    let pbr = &definition.pbr_metallic_roughness;
     let mut load = |slot: Option<Slot>, srgb: bool, name: &str| -> Result<Option<TextureRef>, SceneError> {
         slot.map(|slot| slot.load(document, textures, srgb, &format!("{place} {name}"))).transpose()
     };
@@ -112,18 +112,8 @@ fn read(
             notes.add(note, place);
         }
     }
-    let mut color = Vec4::from_array(pbr.base_color_factor.0);
-    let (mut metallic, mut roughness) = (pbr.metallic_factor.0, pbr.roughness_factor.0);
-    let mut color_slot = pbr.base_color_texture.as_ref().map(Slot::from);
-    let mut metallic_roughness_slot = pbr.metallic_roughness_texture.as_ref().map(Slot::from);
-    if let Some(glossiness) = others.and_then(|others| others.get("KHR_materials_pbrSpecularGlossiness")) {
-        notes.add("KHR_materials_pbrSpecularGlossiness is read as diffuse colour and roughness alone", place);
-        color = Vec4::from_array(numbers(glossiness, "diffuseFactor").unwrap_or([1.0; 4]));
-        color_slot = slot(document, glossiness, "diffuseTexture", place)?;
-        metallic = 0.0;
-        roughness = 1.0 - numbers::<1>(glossiness, "glossinessFactor").map_or(1.0, |[g]| g);
-        metallic_roughness_slot = None;
-    }
+    let base = BaseLayer::read(document, definition, place, notes)?;
+    let BaseLayer { color, metallic, roughness, .. } = base;
     let strength = definition.extensions.as_ref().and_then(|e| e.emissive_strength.as_ref());
     let emission = Vec3::from_array(definition.emissive_factor.0) * strength.map_or(1.0, |s| s.emissive_strength.0);
     let normal = definition.normal_texture.as_ref();
@@ -138,22 +128,17 @@ fn read(
         notes.add("factors outside their range are clamped to it", place);
     }
     let emission = emission.max(Vec3::ZERO);
-    // A texture on a factor of zero is never looked up, so it need not exist.
+    // A texture whose factor is zero is never looked up, so it need not exist.
     let emission_slot = definition.emissive_texture.as_ref().filter(|_| emission != Vec3::ZERO).map(Slot::from);
     let normal_slot = normal.map(|n| Slot::from_normal(document, n, place)).transpose()?;
-    let alpha_mode = match definition.alpha_mode {
-        Checked::Valid(DefinedAlpha::Opaque) => AlphaMode::Opaque,
-        Checked::Valid(DefinedAlpha::Mask) => AlphaMode::Mask { cutoff },
-        Checked::Valid(DefinedAlpha::Blend) => AlphaMode::Blend,
-        Checked::Invalid => return Err(document.invalid(place, "its alphaMode is none of glTF's", RE_EXPORT)),
-    };
+    let alpha_mode = alpha_mode(document, definition, cutoff, place)?;
     Ok(Material {
         name: definition.name.as_deref().map_or_else(|| place.to_owned(), short),
         base_color: color.clamp(Vec4::ZERO, Vec4::ONE),
-        base_color_texture: load(color_slot, true, "baseColorTexture")?,
+        base_color_texture: load(base.color_slot, true, "baseColorTexture")?,
         metallic: metallic.clamp(0.0, 1.0),
         roughness: roughness.clamp(0.0, 1.0),
-        metallic_roughness_texture: load(metallic_roughness_slot, false, "metallicRoughnessTexture")?,
+        metallic_roughness_texture: load(base.metallic_roughness_slot, false, "metallicRoughnessTexture")?,
         emission,
         emission_texture: load(emission_slot, true, "emissiveTexture")?,
         normal_texture: load(normal_slot, false, "normalTexture")?,
@@ -164,13 +149,64 @@ fn read(
     })
 }
 
-/// Extensions that change how light goes through a material, which is not modelled.
+/// Base colour, metalness and roughness of a material, as they stand in the file.
+struct BaseLayer {
+    color: Vec4,
+    color_slot: Option<Slot>,
+    metallic: f32,
+    roughness: f32,
+    metallic_roughness_slot: Option<Slot>,
+}
+
+impl BaseLayer {
+    /// `KHR_materials_pbrSpecularGlossiness` replaces the metallic-roughness parameters if a material has it.
+    fn read(
+        document: &Document,
+        definition: &Definition,
+        place: &str,
+        notes: &mut Notes,
+    ) -> Result<BaseLayer, SceneError> {
+        let others = definition.extensions.as_ref().map(|e| &e.others);
+        if let Some(glossiness) = others.and_then(|others| others.get("KHR_materials_pbrSpecularGlossiness")) {
+            notes.add("KHR_materials_pbrSpecularGlossiness is read as diffuse colour and roughness alone", place);
+            return Ok(BaseLayer {
+                color: Vec4::from_array(numbers(glossiness, "diffuseFactor").unwrap_or([1.0; 4])),
+                color_slot: slot(document, glossiness, "diffuseTexture", place)?,
+                metallic: 0.0,
+                roughness: 1.0 - numbers::<1>(glossiness, "glossinessFactor").map_or(1.0, |[g]| g),
+                metallic_roughness_slot: None,
+            });
+        }
+        let pbr = &definition.pbr_metallic_roughness;
+        Ok(BaseLayer {
+            color: Vec4::from_array(pbr.base_color_factor.0),
+            color_slot: pbr.base_color_texture.as_ref().map(Slot::from),
+            metallic: pbr.metallic_factor.0,
+            roughness: pbr.roughness_factor.0,
+            metallic_roughness_slot: pbr.metallic_roughness_texture.as_ref().map(Slot::from),
+        })
+    }
+}
+
+fn alpha_mode(document: &Document, definition: &Definition, cutoff: f32, place: &str) -> Result<AlphaMode, SceneError> {
+    match definition.alpha_mode {
+        Checked::Valid(DefinedAlpha::Opaque) => Ok(AlphaMode::Opaque),
+        Checked::Valid(DefinedAlpha::Mask) => Ok(AlphaMode::Mask { cutoff }),
+        Checked::Valid(DefinedAlpha::Blend) => Ok(AlphaMode::Blend),
+        Checked::Invalid => Err(document.invalid(place, "glTF does not define its alphaMode", RE_EXPORT)),
+    }
+}
+
+/// Extensions that let light pass through a material, which is not modelled; each with its warning.
 const UNMODELLED: &[(&str, &str)] = &[
-    ("KHR_materials_transmission", "KHR_materials_transmission is not modelled; no light passes these"),
-    ("KHR_materials_diffuse_transmission", "KHR_materials_diffuse_transmission is not modelled; no light passes these"),
+    ("KHR_materials_transmission", "KHR_materials_transmission is not modelled; no light passes these materials"),
+    (
+        "KHR_materials_diffuse_transmission",
+        "KHR_materials_diffuse_transmission is not modelled; no light passes these materials",
+    ),
 ];
 
-/// `N` numbers under `key`: a list, or for N = 1 a number.
+/// The `N` numbers under `key`. They are a list, or for N = 1 a single number.
 fn numbers<const N: usize>(object: &Value, key: &str) -> Option<[f32; N]> {
     let value = object.get(key)?;
     let mut out = [0.0; N];
@@ -186,7 +222,8 @@ fn numbers<const N: usize>(object: &Value, key: &str) -> Option<[f32; N]> {
     Some(out)
 }
 
-/// Opaque where no texel and no vertex can make a difference. Interpolation never goes below the least value.
+/// The material's alpha mode, or opaque if no point of it can be transparent. The product of the least values of
+/// factor, vertices and texture is a lower bound, because interpolation never goes below the least value.
 fn simplest_alpha(material: &Material, least_vertex_alpha: f32, textures: &Textures) -> AlphaMode {
     let texture = material.base_color_texture.map_or(1.0, |t| textures.least_alpha[t.texture.0 as usize]);
     let least = material.base_color.w * least_vertex_alpha * texture;

@@ -1,6 +1,7 @@
-//! From a glTF file to a [`Scene`]: container → JSON → buffers → nodes → meshes → materials → one pool of triangles.
+//! From a glTF file to a [`Scene`]: container → JSON → buffers → nodes → meshes → materials → one list of triangles.
 //!
-//! Nothing in a file is believed before it is checked, and nothing is allocated on the word of its header.
+//! Everything in a file is checked before it is used. The sizes that a header claims never decide how much is
+//! allocated.
 
 mod accessor;
 mod buffers;
@@ -16,7 +17,9 @@ mod lights;
 mod materials;
 mod nodes;
 mod places;
+mod poses;
 mod primitive;
+mod text;
 mod texture_slot;
 mod textures;
 mod transform;
@@ -30,7 +33,7 @@ use self::document::Document;
 use self::draws::Draws;
 use self::flatten::{Flattened, flatten};
 use self::inputs::Inputs;
-use self::lights::Origin;
+use self::lights::SceneOrigin;
 use self::materials::Materials;
 use self::nodes::Nodes;
 use self::primitive::Skipped;
@@ -42,10 +45,11 @@ use super::{DroppedTriangles, Material, Scene};
 
 /// Loads a `.gltf` or `.glb` file with its buffers, its images and the sky.
 ///
-/// # Errors
+/// Losses that leave a usable scene are no errors but [`Scene::warnings`]: skins at rest, material layers that are not
+/// modelled, dropped triangles.
 ///
-/// Every [`SceneError`] names file, place and remedy. What only makes a scene poorer than it was meant (skins at rest,
-/// unmodelled material layers, dropped triangles) is in [`Scene::warnings`] instead.
+/// # Errors
+/// Every [`SceneError`] names file, place and remedy.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
     let mut warnings = Vec::new();
     let mut inputs = Inputs::new();
@@ -79,7 +83,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
         return Err(empty(format!("all of the scene's {} triangles are degenerate", dropped.total())));
     }
 
-    let origin = Origin { landmark: &landmark, centre };
+    let origin = SceneOrigin { landmark: &landmark, centre };
     let lights = lights::lights(&document, &nodes, &origin, &mut warnings)?;
     let cameras = lights::cameras(&document, &nodes, &origin, &mut warnings)?;
     let environment = environment::load(options.environment.as_ref(), &mut inputs, &mut warnings)?;
@@ -113,7 +117,10 @@ fn report_skipped(skipped: &Skipped, has_skins: bool, warnings: &mut Vec<String>
     warn(skipped.without_positions, "mesh primitives have no POSITION and are left out");
     warn(skipped.incomplete_triangles, "mesh primitives end in an incomplete triangle, which is left out");
     warn(skipped.morph_targets, "mesh primitives have morph targets; their base shape is loaded");
-    warn(skipped.more_influences, "mesh primitives have more than four joints to a vertex; the first four count");
+    warn(
+        skipped.more_influences,
+        "mesh primitives have more than four joints per vertex; only the first four are used",
+    );
     if has_skins {
         warnings.push("skinned meshes are loaded in the pose of their joints' nodes".to_owned());
     }

@@ -1,18 +1,19 @@
-//! The node forest: checked, placed in the world, and listed in the order of the scene. Nothing here recurses, so a
-//! chain of a million nodes is no deeper than one.
+//! The trees of nodes: they are checked, placed in the world, and listed in the order of the scene. No function here
+//! recurses, so a chain of a million nodes cannot overflow the stack.
 
 use serde_json::Value;
 
 use gltf::json::Node;
 
-use super::document::{Document, label};
+use super::document::Document;
+use super::text::label;
 use super::transform::{Local, Placement};
 use crate::scene::error::{RE_EXPORT, SceneError};
 
 pub(super) struct Nodes {
-    /// World transform of every node of the file (joints may lie outside the scene).
+    /// World transforms of all nodes of the file. Nodes outside the scene are included, because they can be joints.
     pub placements: Vec<Placement>,
-    /// Nodes of the scene to render, parents before children, without the ignored ones.
+    /// Nodes of the chosen scene, parents before children, without those that are to be ignored.
     pub visible: Vec<usize>,
 }
 
@@ -27,7 +28,7 @@ impl Nodes {
     }
 }
 
-/// `node 3 'Wall'`.
+/// The node's text in messages, for example `node 3 'Wall'`.
 pub(super) fn node_label(document: &Document, node: usize) -> String {
     label("node", node, document.nodes.get(node).and_then(|n| n.name.as_deref()))
 }
@@ -36,7 +37,7 @@ fn children(node: &Node) -> impl DoubleEndedIterator<Item = usize> {
     node.children.iter().flatten().map(|child| child.value())
 }
 
-/// For each node, whether it is some node's child; an error when it is two nodes' child or does not exist.
+/// For each node, whether it is the child of a node. Fails if a child has two parents or does not exist.
 fn check_parents(document: &Document) -> Result<Vec<bool>, SceneError> {
     let mut is_child = vec![false; document.nodes.len()];
     for (index, node) in document.nodes.iter().enumerate() {
@@ -55,7 +56,8 @@ fn check_parents(document: &Document) -> Result<Vec<bool>, SceneError> {
     Ok(is_child)
 }
 
-/// World transforms of all nodes, from the parentless ones down. Nodes not reached lie on a cycle: each has one parent.
+/// World transforms of all nodes. The walk starts at the nodes without parent (`top`). Each node has at most one
+/// parent, so the nodes that the walk does not reach lie on or below a cycle.
 fn place(document: &Document, top: &[usize]) -> Result<Vec<Placement>, SceneError> {
     let mut placements = vec![None; document.nodes.len()];
     let mut stack: Vec<(usize, Placement)> = top.iter().map(|&node| (node, Placement::IDENTITY)).collect();
@@ -92,7 +94,7 @@ fn scene_roots(
         None => 0,
     };
     let Some(roots) = document.scenes.get(chosen) else {
-        let what = format!("scene {chosen} is asked for, but the file has {}", document.scenes.len());
+        let what = format!("there is no scene {chosen}; the number of scenes is {}", document.scenes.len());
         return Err(document.invalid("scene", what, "name a scene that exists, or export the file again"));
     };
     if document.scenes.len() > 1 {
@@ -105,7 +107,7 @@ fn scene_roots(
     Ok(roots.clone())
 }
 
-/// Depth first in the order of the file, each node once.
+/// The visible nodes, depth first in the order of the file, each once.
 fn walk(document: &Document, roots: &[usize], warnings: &mut Vec<String>) -> Result<Vec<usize>, SceneError> {
     let mut visible = Vec::new();
     let mut seen = vec![false; document.nodes.len()];
@@ -124,12 +126,12 @@ fn walk(document: &Document, roots: &[usize], warnings: &mut Vec<String>) -> Res
     }
     if hidden > 0 {
         let what = "marked extras.lightprobe = \"ignore\" or invisible";
-        warnings.push(format!("{hidden} nodes {what} are left out with all below them"));
+        warnings.push(format!("{hidden} nodes {what} are left out with all their descendants"));
     }
     Ok(visible)
 }
 
-/// Whether a node and all below it are to be left out.
+/// Whether a node and its descendants are to be left out.
 fn is_ignored(node: &Node) -> bool {
     let extras = node.extras.as_ref().and_then(|raw| serde_json::from_str::<Value>(raw.get()).ok());
     let marked = extras.is_some_and(|e| e.get("lightprobe").and_then(Value::as_str) == Some("ignore"));

@@ -1,4 +1,4 @@
-//! Where meshes stand: skins in their bind pose and GPU instances.
+//! The places of meshes: skins in the pose of their joints, and GPU instances.
 
 use glam::{DMat3, DVec3};
 use gltf::json::{Accessor as AccessorDefinition, Index};
@@ -6,14 +6,21 @@ use serde_json::Value;
 
 use super::accessor::Accessor;
 use super::buffers::Buffers;
-use super::document::{Document, label};
-use super::draws::{Draws, Place};
+use super::document::Document;
 use super::nodes::{Nodes, node_label};
-use super::primitive::Primitive;
-use super::transform::{Local, Placement, Pose, WorldPoint};
+use super::text::label;
+use super::transform::{Local, Placement};
 use crate::scene::error::{RE_EXPORT, SceneError};
 
-/// Joint matrices at rest. The mesh node's own transform is not among them: glTF has joints place a skinned mesh.
+/// Where a primitive is drawn.
+pub(super) enum Place {
+    Rigid(Placement),
+    /// Index of the skin's joint matrices in [`super::draws::Draws::skeletons`].
+    Skinned(usize),
+}
+
+/// The joint matrices of a skin. They do not contain the transform of the mesh's own node, because in glTF the joints
+/// alone place a skinned mesh.
 pub(super) fn skeleton(
     document: &Document,
     buffers: &Buffers,
@@ -54,7 +61,7 @@ pub(super) fn skeleton(
     Ok(joints)
 }
 
-/// `EXT_mesh_gpu_instancing`: the node's transform × each instance's.
+/// The places of GPU instances (`EXT_mesh_gpu_instancing`): the node's transform × that of each instance.
 pub(super) fn instances(
     document: &Document,
     buffers: &Buffers,
@@ -100,43 +107,4 @@ pub(super) fn instances(
         places.push(Place::Rigid(placement));
     }
     Ok(places)
-}
-
-/// The transform of one vertex: weighted joints, or the same pose for all.
-pub(super) enum Poses {
-    Rigid(Pose),
-    Skinned(Vec<Pose>),
-}
-
-impl Poses {
-    pub fn of(draws: &Draws, place: &Place, origin: &WorldPoint) -> Poses {
-        match place {
-            Place::Rigid(placement) => Poses::Rigid(placement.relative_to(origin)),
-            Place::Skinned(skeleton) => {
-                Poses::Skinned(draws.skeletons[*skeleton].iter().map(|joint| joint.relative_to(origin)).collect())
-            }
-        }
-    }
-
-    pub fn at(&self, primitive: &Primitive, vertex: usize) -> Pose {
-        let joints = match self {
-            Poses::Rigid(pose) => return *pose,
-            Poses::Skinned(joints) => joints,
-        };
-        let mut sum = Pose { linear: DMat3::ZERO, offset: DVec3::ZERO };
-        let mut total = 0.0;
-        for &(joint, weight) in &primitive.influences[vertex] {
-            if weight != 0.0 {
-                let (pose, weight) = (&joints[joint as usize], f64::from(weight));
-                sum.linear += pose.linear * weight;
-                sum.offset += pose.offset * weight;
-                total += weight;
-            }
-        }
-        // Weights ought to sum to 1 and miss it by rounding; a vertex without any follows the first joint.
-        if total == 0.0 {
-            return joints[0];
-        }
-        Pose { linear: sum.linear * (1.0 / total), offset: sum.offset / total }
-    }
 }

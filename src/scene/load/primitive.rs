@@ -1,4 +1,4 @@
-//! Mesh primitives: attributes as plain arrays, any triangle topology as a list of triangles.
+//! Mesh primitives: attributes become plain arrays, and strips and fans become lists of triangles.
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use gltf::json::mesh::{Mesh, Mode, Primitive as Definition, Semantic};
@@ -6,11 +6,12 @@ use gltf::json::validation::Checked;
 
 use super::accessor::Accessor;
 use super::buffers::Buffers;
-use super::document::{Document, label};
+use super::document::Document;
 use super::extensions::remedy;
+use super::text::label;
 use crate::scene::error::{RE_EXPORT, SceneError};
 
-/// One primitive in its own space. All attribute lists are as long as `positions`, or empty where the file gives none.
+/// One primitive in its own space. Each list of an attribute is as long as `positions`, or empty if the file has none.
 pub(super) struct Primitive {
     /// glTF material; `None` is glTF's default material.
     pub material: Option<usize>,
@@ -19,13 +20,14 @@ pub(super) struct Primitive {
     pub uvs: [Vec<Vec2>; 2],
     pub colors: Vec<Vec4>,
     pub tangents: Vec<Vec4>,
-    /// Joint and weight, four to a vertex.
+    /// Four pairs of joint and weight per vertex.
     pub influences: Vec<[(u32, f32); 4]>,
     pub triangles: Vec<[u32; 3]>,
+    /// The primitive's text in messages.
     pub place: String,
 }
 
-/// What the loader met and did not use.
+/// Numbers of primitives that the loader left out or read in part.
 #[derive(Default)]
 pub(super) struct Skipped {
     pub points_or_lines: usize,
@@ -35,15 +37,15 @@ pub(super) struct Skipped {
     pub more_influences: usize,
 }
 
-/// Vertices and triangles that a mesh claims, both backed by bytes of the file.
+/// The size of a mesh. The file's bytes contain all these vertices and triangles; the accessors' checks ensure it.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Size {
+pub(super) struct MeshSize {
     pub primitives: u64,
     pub vertices: u64,
     pub triangles: u64,
 }
 
-/// A primitive that has triangles, with its accessors checked and nothing decoded yet.
+/// A primitive with triangles. Its accessors are checked, but nothing is decoded yet.
 struct Opened<'a> {
     definition: &'a Definition,
     mode: Mode,
@@ -52,9 +54,14 @@ struct Opened<'a> {
     place: String,
 }
 
-/// How large the mesh will be once decoded.
-pub(super) fn size(document: &Document, buffers: &Buffers, index: usize, mesh: &Mesh) -> Result<Size, SceneError> {
-    let mut size = Size::default();
+/// The size of a mesh after decoding.
+pub(super) fn mesh_size(
+    document: &Document,
+    buffers: &Buffers,
+    index: usize,
+    mesh: &Mesh,
+) -> Result<MeshSize, SceneError> {
+    let mut size = MeshSize::default();
     for opened in open(document, buffers, index, mesh, &mut Skipped::default())? {
         let corners = opened.indices.as_ref().unwrap_or(&opened.positions).count as u64;
         size.primitives += 1;
@@ -89,7 +96,7 @@ fn open<'a>(
     for (number, definition) in mesh.primitives.iter().enumerate() {
         let place = format!("{} primitive {number}", label("mesh", index, mesh.name.as_deref()));
         let Checked::Valid(mode) = definition.mode else {
-            return Err(document.invalid(place, "its mode is none of glTF's", RE_EXPORT));
+            return Err(document.invalid(place, "glTF does not define its mode", RE_EXPORT));
         };
         if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
             skipped.points_or_lines += 1;
@@ -111,7 +118,7 @@ fn open<'a>(
     Ok(opened)
 }
 
-/// A Draco primitive can be read only when its accessors have plain data too.
+/// Refuses a Draco primitive, unless its accessors have plain data too.
 fn refuse_draco(document: &Document, definition: &Definition, place: &str) -> Result<(), SceneError> {
     const DRACO: &str = "KHR_draco_mesh_compression";
     let has_draco = definition.extensions.as_ref().is_some_and(|e| e.others.contains_key(DRACO));
@@ -147,7 +154,7 @@ impl Opened<'_> {
         };
         let normals = attribute(Semantic::Normals, &[3])?.map(|a| a.floats([0.0; 3], false));
         let tangents = attribute(Semantic::Tangents, &[4])?.map(|a| a.floats([0.0; 4], false));
-        // Colours without alpha are opaque; a NaN is no colour at all.
+        // Colours without alpha are opaque. A colour with a NaN is replaced by white.
         let colors = attribute(Semantic::Colors(0), &[3, 4])?.map(|a| a.floats([0.0, 0.0, 0.0, 1.0], true));
         let color = |c: [f32; 4]| match c.iter().all(|x| x.is_finite()) {
             true => Vec4::from_array(c).max(Vec4::ZERO).min(Vec4::new(f32::MAX, f32::MAX, f32::MAX, 1.0)),
@@ -183,7 +190,7 @@ impl Opened<'_> {
                     return Err(document.invalid(place(), "they are not unsigned integers", RE_EXPORT));
                 };
                 if let Some((at, [index])) = list.iter().enumerate().find(|(_, [i])| *i as usize >= vertices) {
-                    let what = format!("index {index} (number {at}) is out of range of its {vertices} vertices");
+                    let what = format!("index {index} (at position {at}) exceeds its {vertices} vertices");
                     return Err(document.invalid(place(), what, RE_EXPORT));
                 }
                 list.into_iter().map(|[index]| index).collect()
@@ -196,7 +203,7 @@ impl Opened<'_> {
     }
 }
 
-/// Triangles of a topology, wound as glTF 2.0 section 3.7.2.1 says.
+/// The triangles of a topology, with the winding of glTF 2.0, section 3.7.2.1.
 fn assemble(mode: Mode, corners: &[u32]) -> Vec<[u32; 3]> {
     match mode {
         Mode::TriangleStrip => corners

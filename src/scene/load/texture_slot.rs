@@ -13,7 +13,7 @@ use super::textures::Textures;
 use crate::scene::TextureRef;
 use crate::scene::error::{RE_EXPORT, SceneError};
 
-/// A slot as the file has it.
+/// A texture slot of a material, as it stands in the file.
 pub(super) struct Slot {
     texture: Index<Definition>,
     tex_coord: u32,
@@ -28,14 +28,14 @@ impl From<&Info> for Slot {
 }
 
 impl Slot {
-    /// `gltf::json` leaves the transform of normal textures unread.
+    /// The slot of a normal texture. Its transform is parsed here, because `gltf::json` does not parse it.
     pub fn from_normal(document: &Document, normal: &NormalTexture, place: &str) -> Result<Slot, SceneError> {
         let extension = normal.extensions.as_ref().and_then(|e| e.others.get("KHR_texture_transform"));
         let transform = extension.map(|e| parse(document, e, "normalTexture", place)).transpose()?;
         Ok(Slot { texture: normal.index, tex_coord: normal.tex_coord, transform })
     }
 
-    /// Loads the texture. `place` names material and slot.
+    /// Loads the texture. `place` names material and slot in messages.
     pub fn load(
         self,
         document: &Document,
@@ -56,7 +56,7 @@ impl Slot {
     }
 }
 
-/// The texture info under `key` of an extension that `gltf::json` does not know.
+/// The texture slot under `key` of an extension that `gltf::json` does not parse.
 pub(super) fn slot(document: &Document, object: &Value, key: &str, place: &str) -> Result<Option<Slot>, SceneError> {
     let info = object.get(key).map(|value| parse::<Info>(document, value, key, place)).transpose()?;
     Ok(info.as_ref().map(Slot::from))
@@ -66,9 +66,10 @@ fn parse<T: DeserializeOwned>(document: &Document, value: &Value, key: &str, pla
     T::deserialize(value).map_err(|e| document.invalid(format!("{place} {key}"), e.to_string(), RE_EXPORT))
 }
 
-/// Translation · rotation · scale. The rotation is counter-clockwise as one sees it with v pointing down, which is
-/// what the extension's text, its example and its viewers have (u′ = u·cos + v·sin); the GLSL in its text, read column
-/// by column, turns the other way.
+/// Translation · rotation · scale. The rotation is counter-clockwise as seen with v pointing down: u′ = u·cos + v·sin.
+///
+/// The extension's text, its example and its viewers agree on this. The GLSL code in its text turns the other way,
+/// because GLSL lists matrices column by column.
 fn matrix(transform: &TextureTransform) -> Mat3 {
     let (sin, cos) = transform.rotation.0.sin_cos();
     let scale = Vec2::from_array(transform.scale.0);

@@ -1,4 +1,4 @@
-//! Textures as materials refer to them: the image behind each, decoded once per use as colour or as data.
+//! Textures of materials. An image is decoded once as colours and once as data, if it is used as both.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -8,29 +8,30 @@ use gltf::json::validation::Checked;
 use gltf::json::{Image, Index, Texture as Definition};
 
 use super::buffers::Buffers;
-use super::document::{Document, label, sentence};
+use super::document::Document;
 use super::extensions::{COMPRESSED_IMAGES, remedy};
 use super::image::{Budget, Decoded, Failure};
 use super::inputs::{Inputs, Resource, resolve};
+use super::text::{label, sentence};
 use crate::scene::error::{RE_EXPORT, SceneError};
 use crate::scene::material::{Texels, Texture, TextureIndex, Wrap};
 
-/// Textures loaded so far. What no material asks for is never read.
+/// The textures loaded so far. Images that no material uses are never read.
 pub(super) struct Textures<'a> {
     document: &'a Document,
     buffers: &'a Buffers<'a>,
     inputs: &'a mut Inputs,
     collapse_constant: bool,
     budget: Budget,
-    /// Image files, read once even when decoded twice.
+    /// Contents of image files by image index. A file is read once even if it is decoded twice.
     files: HashMap<usize, Vec<u8>>,
     loaded: HashMap<Key, TextureIndex>,
     pub textures: Vec<Texture>,
-    /// Whether each texture's alpha is below 1 anywhere, and its least value.
+    /// Least alpha of each texture.
     pub least_alpha: Vec<f32>,
 }
 
-/// Two uses that share these share their texels.
+/// Uses of an image that are equal in these four share one texture.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 struct Key {
     image: usize,
@@ -59,7 +60,7 @@ impl<'a> Textures<'a> {
         }
     }
 
-    /// The texture of that glTF index, as colours (`srgb`) or as data. `place` is the material slot that asks.
+    /// Loads a texture as colours (`srgb`) or as data. `place` names the material slot in messages.
     pub fn load(&mut self, texture: Index<Definition>, srgb: bool, place: &str) -> Result<TextureIndex, SceneError> {
         let definition = self.document.get(&self.document.textures, "texture", texture, &place)?;
         let place = format!("{place}: {}", label("texture", texture.value(), definition.name.as_deref()));
@@ -93,9 +94,9 @@ impl<'a> Textures<'a> {
         Ok(index)
     }
 
-    /// The PNG or JPEG source, even where an extension offers another.
+    /// The texture's PNG or JPEG image. Images that extensions offer beside it are not used.
     fn image_of(&self, definition: &Definition, place: &str) -> Result<Index<Image>, SceneError> {
-        // gltf::json gives a texture without a source this index.
+        // u32::MAX is the index that gltf::json gives to a missing source.
         if definition.source.value() != u32::MAX as usize {
             return Ok(definition.source);
         }
@@ -127,7 +128,7 @@ impl<'a> Textures<'a> {
             Checked::Valid(WrappingMode::MirroredRepeat) => Ok(Wrap::MirroredRepeat),
             Checked::Valid(WrappingMode::ClampToEdge) => Ok(Wrap::ClampToEdge),
             Checked::Invalid => {
-                Err(self.document.invalid(place, "its sampler's wrap mode is none of glTF's", RE_EXPORT))
+                Err(self.document.invalid(place, "glTF does not define its sampler's wrap mode", RE_EXPORT))
             }
         };
         let nearest = sampler.mag_filter == Some(Checked::Valid(MagFilter::Nearest));

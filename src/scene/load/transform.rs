@@ -1,7 +1,8 @@
 //! Node transforms: the linear part in f64, the translation as an unevaluated sum of two f64 (106 bits).
 //!
-//! A root node that moves the scene 10⁶ times its size then changes no bit of what is computed relative to the scene:
-//! `t_world = t_parent ⊕ A_parent·t_local`, where only the sum feels the distance, and the sum keeps every bit.
+//! The extra bits make results relative to the scene independent of its position in the world. A root node may move the
+//! scene by 10⁶ times its size: in `t_world = t_parent ⊕ A_parent·t_local` only the sum ⊕ contains that distance, and
+//! 106 bits hold the sum without rounding.
 
 use glam::{DMat3, DQuat, DVec3};
 use gltf::json::Node;
@@ -14,7 +15,7 @@ pub(super) struct Local {
     pub translation: DVec3,
 }
 
-/// A point of the world, too far away for one f64.
+/// A point of the world. It may lie so far from the origin that one f64 per coordinate is too coarse.
 pub(super) type WorldPoint = [TwoFloat; 3];
 
 /// World transform of a node or instance: `world_from_local`.
@@ -24,7 +25,7 @@ pub(super) struct Placement {
     pub translation: WorldPoint,
 }
 
-/// A placement seen from a nearby point: all in f64.
+/// A placement relative to a nearby point, for which f64 suffices.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pose {
     pub linear: DMat3,
@@ -32,7 +33,7 @@ pub(super) struct Pose {
 }
 
 impl Local {
-    /// Translation, rotation (x, y, z, w; normalised here) and scale. A zero rotation counts as none.
+    /// From translation, rotation (x, y, z, w; normalised here) and scale. A rotation of length zero is ignored.
     pub fn from_trs(translation: [f32; 3], rotation: [f32; 4], scale: [f32; 3]) -> Local {
         let [x, y, z, w] = rotation.map(f64::from);
         let length = (x * x + y * y + z * z + w * w).sqrt();
@@ -47,7 +48,7 @@ impl Local {
         }
     }
 
-    /// A column-major 4×4 matrix; its last row is taken as 0 0 0 1, as glTF demands.
+    /// From a column-major 4×4 matrix. Its last row is ignored, because glTF requires it to be 0 0 0 1.
     pub fn from_matrix(matrix: &[f32; 16]) -> Local {
         let column = |i: usize| DVec3::new(f64::from(matrix[i]), f64::from(matrix[i + 1]), f64::from(matrix[i + 2]));
         Local { linear: DMat3::from_cols(column(0), column(4), column(8)), translation: column(12) }
@@ -88,7 +89,7 @@ impl Placement {
     pub fn relative_to(&self, origin: &WorldPoint) -> Pose {
         let axis = |i: usize| {
             let difference = self.translation[i] - origin[i];
-            // + 0.0 turns −0 into +0: the sign of a vanished difference depends on where the scene stands.
+            // + 0.0 turns −0 into +0, because the sign of a zero difference would depend on the scene's position.
             difference.hi() + difference.lo() + 0.0
         };
         Pose { linear: self.linear, offset: DVec3::new(axis(0), axis(1), axis(2)) }
@@ -110,21 +111,21 @@ pub(super) fn world_point(point: &WorldPoint, offset: DVec3) -> DVec3 {
     DVec3::new(axis(0), axis(1), axis(2))
 }
 
-/// What normals are multiplied with, up to a positive factor: the cofactor matrix times the determinant's sign, which
-/// is the inverse transpose without its division. Outward normals stay outward under mirroring; a flattening
-/// transform gives the normal of the plane that it flattens onto.
+/// The matrix that transforms normals, up to a positive factor: the cofactor matrix times the sign of the determinant.
+/// It equals the inverse transpose up to that factor but needs no division, so it exists for all transforms. Outward
+/// normals stay outward under mirroring. A transform that flattens onto a plane gives the plane's normal.
 pub(super) fn normal_matrix(linear: &DMat3) -> DMat3 {
     let a = of_unit_size(linear);
     let cofactor = DMat3::from_cols(a.y_axis.cross(a.z_axis), a.z_axis.cross(a.x_axis), a.x_axis.cross(a.y_axis));
     if is_mirrored(linear) { cofactor * -1.0 } else { cofactor }
 }
 
-/// Whether the transform turns right hands into left hands.
+/// Whether the transform mirrors, that is, has a negative determinant.
 pub(super) fn is_mirrored(linear: &DMat3) -> bool {
     of_unit_size(linear).determinant() < 0.0
 }
 
-/// Scaled so that the largest entry is ±1: products of three entries of 1e-200 would vanish.
+/// The matrix scaled so that its largest entry is ±1. Otherwise products of three entries of 1e-200 would become zero.
 fn of_unit_size(linear: &DMat3) -> DMat3 {
     let size = linear.to_cols_array().into_iter().fold(0.0f64, |size, x| size.max(x.abs()));
     if size > 0.0 && size.is_finite() { *linear * size.recip() } else { DMat3::ZERO }

@@ -1,9 +1,10 @@
-//! What is said about outputs before the work rather than after an hour of it.
+//! Checks of output paths. They run before the work, so that a wrong path does not cost an hour.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::{OutputError, folder_of, link_target};
+use super::error::{OutputError, missing_folder};
+use super::paths::{folder_of, link_target};
 
 /// A path with the flag or argument that gave it, such as `--report`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,7 +19,7 @@ impl Named {
     }
 }
 
-/// Refuses outputs that cannot be written, that would overwrite an input, or each other.
+/// Refuses outputs that cannot be written, that would overwrite an input, or that would overwrite each other.
 ///
 /// # Errors
 /// As those of [`check_writable`]; [`OutputError::IsInput`], [`OutputError::Twice`].
@@ -27,7 +28,8 @@ pub fn check_outputs(outputs: &[Named], inputs: &[Named]) -> Result<(), OutputEr
     outputs.iter().try_for_each(|output| check_writable(&output.path))
 }
 
-/// Refuses outputs that are an input or each other, by whatever path: `./a`, `a` and a link to it are one file.
+/// Refuses an output that is the same file as an input or as another output. Files are compared, not paths: `./a`, `a`
+/// and a link to `a` are one file.
 ///
 /// # Errors
 /// [`OutputError::IsInput`], [`OutputError::Twice`].
@@ -47,11 +49,10 @@ pub fn check_apart(outputs: &[Named], inputs: &[Named]) -> Result<(), OutputErro
     Ok(())
 }
 
-/// Refuses paths that [`super::write_atomically`] will not be able to write: no folder, no permission, or something
-/// there that is no file.
+/// Refuses paths that [`super::write_atomically`] could not write.
 ///
 /// # Errors
-/// As those of writing.
+/// The folder is missing, permission is missing, or the path names something other than a file.
 pub fn check_writable(path: &Path) -> Result<(), OutputError> {
     let target = link_target(path);
     let folder = folder_of(&target);
@@ -64,13 +65,13 @@ pub fn check_writable(path: &Path) -> Result<(), OutputError> {
     check_permission(path, folder)
 }
 
-/// Refuses folders that [`super::create_folder`] will not be able to create, or nothing be written into.
+/// Refuses folders that [`super::create_folder`] could not create or that cannot be written into.
 ///
 /// # Errors
-/// A file in the way, no permission.
+/// A file is in the way, or permission is missing.
 pub fn check_folder(path: &Path) -> Result<(), OutputError> {
     let above = path.ancestors().map(|part| if part == Path::new("") { Path::new(".") } else { part });
-    // Without following it, so that a link to nowhere is something in the way.
+    // Links are not followed here: a link to nowhere is in the way too.
     let Some(existing) = above.into_iter().find(|part| fs::symlink_metadata(part).is_ok()) else { return Ok(()) };
     if !existing.is_dir() {
         return Err(OutputError::FileInTheWay { path: path.to_owned(), blocker: existing.to_owned() });
@@ -84,21 +85,12 @@ fn check_permission(path: &Path, folder: &Path) -> Result<(), OutputError> {
         Err(nix::errno::Errno::EACCES | nix::errno::Errno::EROFS) => {
             Err(OutputError::Denied { path: path.to_owned(), folder: folder.to_owned() })
         }
-        // What else there may be shows when the file is written.
+        // Other errors appear when the file is written.
         _ => Ok(()),
     }
 }
 
-/// Why a file cannot be written into a folder that is none.
-pub(super) fn missing_folder(path: &Path, folder: &Path) -> OutputError {
-    let path = path.to_owned();
-    match folder.ancestors().find(|part| part.exists() && !part.is_dir()) {
-        Some(blocker) => OutputError::NoSuchFolder { path, blocker: blocker.to_owned() },
-        None => OutputError::NoFolder { path, folder: folder.to_owned() },
-    }
-}
-
-/// The file that a path leads to, the same for all paths to it; files that do not exist yet have one too.
+/// One path per file: all paths that lead to a file give the same result, also before the file exists.
 fn identity(path: &Path) -> PathBuf {
     if let Ok(existing) = fs::canonicalize(path) {
         return existing;
@@ -134,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn folders_that_cannot_be() {
+    fn impossible_folders_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         fs::write(at("file"), "").unwrap();

@@ -1,4 +1,4 @@
-//! One file or folder in the place of another, so that a crash leaves the old or the new one, whole.
+//! Replacing a file or folder by another. After a crash the old or the new one is there, complete.
 
 use std::fs::{self, File, Permissions};
 use std::io::{self, ErrorKind};
@@ -8,19 +8,23 @@ use std::path::{Path, PathBuf};
 use nix::errno::Errno;
 use nix::fcntl::{AT_FDCWD, RenameFlags, renameat2};
 
-use super::{OutputError, TEMPORARY_PREFIX, folder_of, link_target, output_error, write_atomically};
+use super::error::{OutputError, output_error};
+use super::paths::{folder_of, link_target};
+use super::write::{TEMPORARY_PREFIX, write_atomically};
 
-/// Beside a folder: the one that takes its place, and, only where the two cannot be exchanged at once, itself in between.
+/// Part of the name of the copy that will take a folder's place.
 const NEW: &str = "new";
+
+/// Part of the name that the old folder gets for a moment on systems that cannot exchange two folders in one step.
 const OLD: &str = "old";
 
-/// Folders are entered for their owner's umask to limit.
+/// Bits of the source folder's mode that its copy takes over.
 const FOLDER_MODE: u32 = 0o777;
 
-/// Puts a copy of `new` in the place of `old`: a file for a file, a folder for a folder.
+/// Replaces `old` by a copy of `new`: a file by a file, or a folder by a folder.
 ///
 /// # Errors
-/// Those of the disk, and a file for a folder; `old` is then as it was.
+/// Those of the disk, and a file and a folder as `old` and `new`. `old` then stays as it was.
 pub fn replace(old: &Path, new: &Path) -> Result<(), OutputError> {
     if new.is_dir() {
         return replace_folder(old, new).map_err(|cause| output_error(old, folder_of(old), cause));
@@ -30,8 +34,8 @@ pub fn replace(old: &Path, new: &Path) -> Result<(), OutputError> {
     write_atomically(old, |file| io::copy(&mut source, file).map(drop))
 }
 
-/// Finishes what a crash interrupted between the two renames of a system that cannot exchange folders, and clears what
-/// copies it left.
+/// Repairs the state after a crash during [`replace`]: it completes an exchange that stopped between its two renames
+/// and removes leftover copies.
 ///
 /// # Errors
 /// Those of the disk.
@@ -50,7 +54,7 @@ pub fn recover(path: &Path) -> Result<(), OutputError> {
     recovered.map_err(|cause| output_error(path, folder_of(&target), cause))
 }
 
-/// A hidden name in the same folder.
+/// A hidden path in the same folder.
 fn beside(path: &Path, what: &str) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     folder_of(path).join(format!("{TEMPORARY_PREFIX}{what}-{name}"))
@@ -70,7 +74,7 @@ fn replace_folder(old: &Path, new: &Path) -> io::Result<()> {
     copy_folder(new, &copy).inspect_err(|_| drop(remove(&copy)))?;
     match renameat2(AT_FDCWD, &copy, AT_FDCWD, &target, RenameFlags::RENAME_EXCHANGE) {
         Ok(()) => sync_folder(folder_of(&target)),
-        // Some network and union file systems cannot.
+        // Some network and union file systems cannot exchange two folders.
         Err(Errno::EINVAL | Errno::ENOSYS | Errno::EOPNOTSUPP) => {
             let between = beside(&target, OLD);
             remove(&between)?;
@@ -84,11 +88,11 @@ fn replace_folder(old: &Path, new: &Path) -> io::Result<()> {
             return Err(error.into());
         }
     }
-    // Now the old one.
+    // After the exchange `copy` is the old folder.
     remove(&copy)
 }
 
-/// Files and folders, each on the disk before this returns; links as what they lead to.
+/// Copies a folder with its content. Symbolic links are followed. All of it is on the disk when this returns.
 fn copy_folder(from: &Path, to: &Path) -> io::Result<()> {
     fs::create_dir(to)?;
     fs::set_permissions(to, Permissions::from_mode(FOLDER_MODE & fs::metadata(from)?.permissions().mode()))?;
@@ -106,7 +110,8 @@ fn copy_folder(from: &Path, to: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Some file systems cannot sync a folder; its files are safe by then.
+/// Syncs a folder's list of names. Some file systems cannot; the error is ignored, because the files' content is on the
+/// disk already.
 fn sync_folder(folder: &Path) {
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }

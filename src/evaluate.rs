@@ -14,7 +14,7 @@ use crate::probe::query::Query;
 use crate::probe::transport::truth::Truth;
 use crate::report::baked::{self, BakedReport};
 use crate::report::reference_layers::ReferenceLayers;
-use crate::report::render::{MethodReport, Spread};
+use crate::report::render::{MethodReport, Timing};
 use crate::report::{error, leak};
 use crate::shade::layers::compose;
 use crate::shade::points::View;
@@ -77,7 +77,7 @@ impl Scenery<'_, '_> {
             let ray_s = if mode == VisibilityMode::Ray { self.primary_s + masks_s } else { self.primary_s };
             let report = MethodReport {
                 name: mode.name(),
-                shade_ms: Spread::of(time_shading(query, points, masks, mode)),
+                shade_ms: Timing::of(time_shading(query, points, masks, mode)),
                 ray_ms: ray_s * 1e3,
                 lookup_ns: time_lookup(query, points, masks, mode),
                 bytes_per_probe,

@@ -1,14 +1,6 @@
 //! What two effective configurations differ in.
 
-use serde::Serialize;
-
-/// A line of the effective configuration.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ConfigChange {
-    pub key: String,
-    pub base: Option<String>,
-    pub candidate: Option<String>,
-}
+pub use crate::report::page::ConfigChange;
 
 /// The keys of two effective configurations, in RON, whose lines differ.
 pub fn config_changes(base: Option<&str>, candidate: Option<&str>) -> Vec<ConfigChange> {

@@ -17,7 +17,6 @@ use super::ratio::{Part, unevenness};
 use super::shown;
 use crate::image::{AnyImage, ImageHeader, Picture, Picture8};
 use crate::math::color::{byte_from_unit, luminance};
-use crate::report::colormap::Scale;
 use crate::report::error::flip::flip_map;
 use crate::report::heatmap::{Heatmap, range_of};
 use crate::report::page::{MOST_PIXELS, PackedImage};
@@ -385,12 +384,10 @@ fn difference_map((title, unit): (&str, &str), base: &Picture, candidate: &Pictu
         values: &values,
         width: base.width,
         height: base.height,
-        range: range_of(&values, Scale::Diverging),
-        scale: Scale::Diverging,
+        range: range_of(&values),
         title: &format!("candidate minus base {title}"),
         unit,
         missing: "not compared",
     }
     .draw()
-    .picture
 }

@@ -4,7 +4,7 @@ use quick_junit::{NonSuccessKind, Report, SerializeError, TestCase, TestCaseStat
 
 use super::DiffReport;
 use super::gate::Gate;
-use super::words::{in_unit, outcome};
+use crate::report::words::{in_unit, outcome};
 
 /// The whole document.
 ///

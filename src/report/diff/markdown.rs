@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::DiffReport;
 use super::gate::Gate;
-use super::words::{in_unit, margin, of_side, outcome};
+use crate::report::words::{in_unit, margin, of_side, outcome};
 use crate::system::format;
 
 /// GitHub takes comments of 65,536 characters; this leaves room for what a job writes around it.

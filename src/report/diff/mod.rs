@@ -24,7 +24,6 @@ pub mod storage;
 mod sweep_plot;
 mod sweeps;
 pub mod thresholds;
-pub mod words;
 
 use std::path::{Path, PathBuf};
 
@@ -46,6 +45,7 @@ use self::sides::{Item, Side};
 use self::thresholds::Thresholds;
 use crate::image::{ImageError, Picture8};
 use crate::probe::container::FileError;
+pub use crate::report::page::Command;
 use crate::report::page::PageError;
 use crate::system::memory::TooLittleMemory;
 
@@ -102,14 +102,6 @@ pub struct Verdict {
     /// The gate that is farthest beyond its threshold.
     pub first: Option<String>,
     pub sentence: String,
-}
-
-/// A line for a shell, and what it is for.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Command {
-    /// Such as "bake, base".
-    pub purpose: String,
-    pub line: String,
 }
 
 /// All of a comparison.

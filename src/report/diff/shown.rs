@@ -33,18 +33,16 @@ pub fn page(report: &DiffReport, shown: Shown) -> Page<'_> {
         added: report.added.clone(),
         missing: report.missing.clone(),
         commands: &report.commands,
+        config_changes: [&report.base, &report.candidate]
+            .iter()
+            .all(|side| side.config.is_some())
+            .then_some(&report.config_changes),
         notes: report.notes.clone(),
     }
 }
 
 fn side(side: &SideReport) -> Side {
-    Side {
-        path: side.path.clone(),
-        kind: side.kind.clone(),
-        seed: side.seed,
-        scene_blake3: side.scene_blake3.clone(),
-        config: side.config.clone(),
-    }
+    Side { path: side.path.clone(), kind: side.kind.clone(), seed: side.seed, scene_blake3: side.scene_blake3.clone() }
 }
 
 /// One pair of pictures of about `pairs`.

@@ -1,6 +1,6 @@
 //! A figure as a mean over pixels and channels, with its variance from the noise of the reference.
 
-use crate::report::reference_layers::Noise;
+use crate::report::reference_layers::ReferenceNoise;
 
 /// The sum Σf of a figure f(r) over pixels and channels, and the variance of the sum. r is the reference with its
 /// noise.
@@ -30,7 +30,7 @@ pub struct Terms {
 impl Pooled {
     /// Adds a pixel. `noise` is the noise of the reference and the index of the pixel.
     #[inline]
-    pub fn add(&mut self, terms: &Terms, noise: Option<(&Noise, usize)>) {
+    pub fn add(&mut self, terms: &Terms, noise: Option<(&ReferenceNoise, usize)>) {
         self.sum += terms.value.iter().sum::<f64>();
         let Some((noise, pixel)) = noise else { return };
         let square = square_share(noise.blocks);

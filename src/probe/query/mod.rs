@@ -213,12 +213,14 @@ impl Query<'_> {
         let volume = self.volume;
         // One set of taps serves all eight probes: they share the direction.
         let taps = volume.irradiance.taps(oct);
-        let per_total = 1.0 / total;
+        // Crushed weights may be so small that the reciprocal of their sum overflows; their shares are the same.
+        let lift = if total < f32::MIN_POSITIVE { 1.0 / f32::MIN_POSITIVE } else { 1.0 };
+        let per_total = 1.0 / (total * lift);
         let mut sum = Vec3A::ZERO;
         for (probe, weight) in corners.probes.iter().zip(corners.weights) {
             if weight > 0.0 {
                 let irradiance = volume.curve.decode(volume.irradiance.sample(probe.0 as usize, &taps));
-                sum += self.settings.blend.forward(irradiance) * (weight * per_total);
+                sum += self.settings.blend.forward(irradiance) * (weight * lift * per_total);
             }
         }
         self.settings.blend.backward(sum).into()
@@ -260,3 +262,6 @@ fn floored_trilinear(fraction: Vec3, i: u32, floor: f32) -> f32 {
     let along = |bit: u32, f: f32| (if i >> bit & 1 == 1 { f } else { 1.0 - f }).max(floor);
     along(0, fraction.x) * along(1, fraction.y) * along(2, fraction.z)
 }
+
+#[cfg(test)]
+mod tests;

@@ -18,12 +18,11 @@
 
 use glam::Vec3;
 
-use super::fixture::{Fixture, ORIGIN, SPACING, point};
-use crate::probe::lattice::ProbeState;
+use super::fixture::{Fixture, point};
 use crate::probe::query::{Blend, DirectionWeight, QueryPoint, QuerySettings, Visibility};
 use crate::probe::store::volume::IrradianceCurve;
 
-const P: Vec3 = Vec3::new(1.5, 0.5, 3.75);
+pub const P: Vec3 = Vec3::new(1.5, 0.5, 3.75);
 
 const TO_PROBES: [Vec3; 8] = [
     Vec3::new(-2.0, -1.0, -2.0),
@@ -42,11 +41,11 @@ const LENGTHS: [f32; 8] = [3.0, 3.0, 3.0, 3.0, 7.0, 7.0, 7.0, 3.0];
 /// tenth of d and its cube or the fifth power of a texel is taken.
 const TOLERANCE: f64 = 2e-5;
 
-fn irradiance(i: usize) -> [f32; 3] {
+pub fn irradiance(i: usize) -> [f32; 3] {
     [4.0f32.powi(i as i32), ((i + 1) * (i + 1)) as f32, ((10 - i) * (10 - i)) as f32]
 }
 
-fn eight() -> Fixture {
+pub fn eight() -> Fixture {
     let mut fixture = Fixture::new([2, 2, 2], irradiance);
     for (i, to_probe) in TO_PROBES.into_iter().enumerate() {
         fixture.place(i, P + to_probe);
@@ -55,27 +54,27 @@ fn eight() -> Fixture {
 }
 
 /// The normal is n = (2, 3, 6)/7, the view (−6, 2, 3)/7.
-fn asking() -> QueryPoint {
+pub fn asking() -> QueryPoint {
     point(P, Vec3::new(2.0, 3.0, 6.0) / 7.0, Vec3::new(-6.0, 2.0, 3.0) / 7.0)
 }
 
-fn assert_close<const N: usize>(found: [f32; N], expected: [f64; N], what: &str) {
+pub fn assert_close<const N: usize>(found: [f32; N], expected: [f64; N], what: &str) {
     for (i, (&f, e)) in found.iter().zip(expected).enumerate() {
         assert!((f64::from(f) - e).abs() <= TOLERANCE * e, "{what} {i}: {f} instead of {e}; all: {found:?}");
     }
 }
 
-fn check_at(fixture: &Fixture, at: &QueryPoint, visibility: Visibility, weights: [f64; 8], irradiance: [f64; 3]) {
+pub fn check_at(fixture: &Fixture, at: &QueryPoint, visibility: Visibility, weights: [f64; 8], irradiance: [f64; 3]) {
     assert_close(fixture.weights(at, visibility).1, weights, "weight");
     assert_close(fixture.look_up(at, visibility), irradiance, "channel");
 }
 
-fn check(fixture: &Fixture, weights: [f64; 8], irradiance: [f64; 3]) {
+pub fn check(fixture: &Fixture, weights: [f64; 8], irradiance: [f64; 3]) {
     check_at(fixture, &asking(), Visibility::Stored, weights, irradiance);
 }
 
 /// The trilinear weights of the table above, of those corners whose bit is set.
-fn trilinear(mask: u8) -> [f64; 8] {
+pub fn trilinear(mask: u8) -> [f64; 8] {
     let weights = [15.0, 5.0, 9.0, 3.0, 45.0, 15.0, 27.0, 9.0].map(|w| w / 128.0);
     std::array::from_fn(|i| if mask >> i & 1 == 1 { weights[i] } else { 0.0 })
 }
@@ -84,27 +83,6 @@ fn trilinear(mask: u8) -> [f64; 8] {
 fn trilinear_alone() {
     // (15·1 + 5·4 + 9·16 + 3·64 + 45·256 + 15·1024 + 27·4096 + 9·16384)/128, and the like.
     check(&eight(), trilinear(0xFF), [2228.89844, 29.125, 40.125]);
-}
-
-#[test]
-fn probes_are_the_corners_of_the_second_cell() {
-    let fixture = Fixture::new([3, 2, 2], irradiance);
-    // Fractions (1/4, 3/8, 3/4) of the cell that begins at probe (1, 0, 0); probe (x, y, z) has the index x + 3·(y + 2·z).
-    let at = QueryPoint { position: P + Vec3::new(SPACING.x, 0.0, 0.0), ..asking() };
-    let (probes, weights) = fixture.weights(&at, Visibility::Stored);
-    assert_eq!(probes, [1, 2, 4, 5, 7, 8, 10, 11]);
-    assert_close(weights, trilinear(0xFF), "weight");
-    // (15·2² + 5·3² + 9·5² + 3·6² + 45·8² + 15·9² + 27·11² + 9·12²)/128.
-    assert_close([fixture.look_up(&at, Visibility::Stored)[1]], [71.0625], "channel");
-}
-
-#[test]
-fn points_beyond_the_hull_use_its_face() {
-    // Below along x, above along z: fractions (0, 3/8, 1) leave corners 4 and 6, with 5/8 and 3/8.
-    let at = QueryPoint { position: Vec3::new(ORIGIN.x - 7.0, P.y, ORIGIN.z + 9.0), ..asking() };
-    // (5·4⁴ + 3·4⁶)/8, (5·25 + 3·49)/8, (5·36 + 3·16)/8.
-    let weights = [0.0, 0.0, 0.0, 0.0, 0.625, 0.0, 0.375, 0.0];
-    check_at(&eight(), &at, Visibility::Stored, weights, [1696.0, 34.0, 28.5]);
 }
 
 #[test]
@@ -335,59 +313,6 @@ fn fifth_powers_are_taken_after_texels_and_before_probes_are_mixed() {
         [s[0] + c / 4.0, s[1] + r / 4.0, s[2] + c * r / 8.0]
     });
     check(&fixture, trilinear(0xFF), [296.77821, 44.7350701, 489.97255]);
-}
-
-#[test]
-fn exact_masks_hide_corners() {
-    let fixture = eight();
-    let masked = |mask, irradiance| check_at(&fixture, &asking(), Visibility::Exact(mask), trilinear(mask), irradiance);
-    masked(0b0110_1011, [1941.21538, 29.9384615, 43.9846154]);
-    masked(0b0001_0110, [198.033898, 20.779661, 44.0847458]);
-    masked(0b1001_0001, [2304.21739, 24.8695652, 46.3913043]);
-    // Where no probe counts there is no light.
-    masked(0, [0.0; 3]);
-}
-
-#[test]
-fn inactive_probes_weigh_nothing() {
-    let mut fixture = eight();
-    fixture.deactivate(2, ProbeState::InsideGeometry);
-    fixture.deactivate(4, ProbeState::NeverSampled);
-    fixture.deactivate(7, ProbeState::InsideGeometry);
-    check(&fixture, trilinear(0b0110_1011), [1941.21538, 29.9384615, 43.9846154]);
-    // An exact mask hides more, and brings none back.
-    check_at(
-        &fixture,
-        &asking(),
-        Visibility::Exact(0b1110_0111),
-        trilinear(0b0110_0011),
-        [2032.04839, 30.6129032, 43.7419355],
-    );
-}
-
-#[test]
-fn surfaces_mask_corners_by_voxel_and_facing() {
-    let mut fixture = Fixture::new([3, 2, 2], |probe| irradiance(if probe == 5 { 9 } else { probe }));
-    // P lies in voxel (0, 0, 1) of its cell: number 0 + 2·(0 + 2·1) = 4; facing +z is 4, −z is 5: keys 28 and 29. Its
-    // neighbour (1, 0, 1) has number 5, key 34.
-    let first: &[(u16, u8)] = &[(26, 0b0000_0001), (28, 0b0110_1011), (29, 0), (34, 0b1001_0001)];
-    // The second cell, where the same voxel says something else.
-    let second: &[(u16, u8)] = &[(28, 0b0001_0110)];
-    // Entry 2, which sees none, has probe 5, (2, 1, 0), to stand in.
-    fixture.surface(&[first, second], &[(2, 5)]);
-    let up = QueryPoint { position: P, ..point(P, Vec3::Z, Vec3::Z) };
-    assert_close(fixture.weights(&up, Visibility::Stored).1, trilinear(0b0110_1011), "weight");
-    let next = QueryPoint { position: P + Vec3::new(SPACING.x, 0.0, 0.0), ..up };
-    assert_close(fixture.weights(&next, Visibility::Stored).1, trilinear(0b0001_0110), "weight");
-    // The facing decides, not the shading normal.
-    let leaning = QueryPoint { normal: Vec3::new(6.0, 2.0, 3.0) / 7.0, ..up };
-    assert_close(fixture.weights(&leaning, Visibility::Stored).1, trilinear(0b0110_1011), "weight");
-    // The far probe alone, whole.
-    let down = point(P, Vec3::NEG_Z, Vec3::Z);
-    assert_close(fixture.look_up(&down, Visibility::Stored), irradiance(9).map(f64::from), "channel");
-    // Where visibility is exact or off, the table does not count.
-    assert_close(fixture.weights(&down, Visibility::Exact(0b1001_0001)).1, trilinear(0b1001_0001), "weight");
-    assert_close(fixture.weights(&down, Visibility::Off).1, trilinear(0xFF), "weight");
 }
 
 #[test]

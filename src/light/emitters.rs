@@ -386,3 +386,6 @@ fn estimated_power(scene: &Scene, triangle: TriangleIndex) -> f32 {
     let sides = if material.double_sided { 2.0 } else { 1.0 };
     scene.mesh.area(triangle) * (mean + POWER_FLOOR * luminance(full)) * sides
 }
+
+#[cfg(test)]
+mod tests;

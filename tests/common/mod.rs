@@ -137,17 +137,3 @@ impl Folder {
         path
     }
 }
-
-/// The shared files of the workplace; `None` (said on stderr) where they are not.
-pub fn shared_scenes() -> Option<PathBuf> {
-    let shared = match std::env::var_os("LIGHTPROBE_SHARED") {
-        Some(path) => PathBuf::from(path),
-        None => Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"),
-    };
-    let scenes = shared.join("scenes");
-    if scenes.is_dir() {
-        return Some(scenes);
-    }
-    eprintln!("SKIPPED: {} is absent; set LIGHTPROBE_SHARED to the shared folder", scenes.display());
-    None
-}

@@ -7,12 +7,12 @@ mod damage;
 mod distance;
 mod geometry;
 mod materials;
+mod promises;
 
 use common::{Folder, Gltf};
 use glam::Vec3;
-use lightprobe::scene::{AlphaMode, LoadOptions, Scene, SceneError, Texels, load};
-use rand_pcg::Pcg32;
-use rand_pcg::rand_core::Rng;
+use lightprobe::scene::{LoadOptions, Scene, SceneError, load};
+use promises::{check, damage};
 use serde_json::{Value, json};
 
 const TRIANGLE: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]];
@@ -34,49 +34,6 @@ fn error(gltf: &Gltf) -> String {
     assert!(!message.contains('\n'), "{message}");
     assert!(message.contains("scene.gltf") && message.contains(';'), "no file or remedy: {message}");
     message
-}
-
-/// What every loaded scene promises.
-fn check(scene: &Scene) {
-    let mesh = &scene.mesh;
-    let vertices = mesh.positions.len();
-    assert!(mesh.positions.iter().all(|p| p.is_finite()));
-    assert!(mesh.normals.iter().all(|n| *n == Vec3::ZERO || (n.length() - 1.0).abs() < 1e-5));
-    assert!(mesh.uvs.iter().all(|uvs| uvs.len() == vertices && uvs.iter().all(|uv| uv.is_finite())));
-    assert!(mesh.normals.len() == vertices);
-    assert!(mesh.colors.is_empty() || mesh.colors.len() == vertices);
-    assert!(mesh.tangents.is_empty() || mesh.tangents.len() == vertices);
-    assert!(mesh.colors.iter().chain(&mesh.tangents).all(|v| v.is_finite()));
-    assert!(mesh.triangles.iter().flatten().all(|&index| (index as usize) < vertices));
-    assert_eq!(mesh.triangles.len(), mesh.materials.len());
-    assert!(!mesh.triangles.is_empty());
-    for (number, material) in mesh.materials.iter().enumerate() {
-        let opaque = scene.materials[material.0 as usize].alpha_mode == AlphaMode::Opaque;
-        assert_eq!(opaque, number < mesh.opaque_count);
-    }
-    for m in &scene.materials {
-        for slot in [m.base_color_texture, m.metallic_roughness_texture, m.emission_texture, m.normal_texture] {
-            assert!(slot.is_none_or(|s| (s.texture.0 as usize) < scene.textures.len() && s.uv_set < 2));
-        }
-        assert!(m.base_color.is_finite() && m.emission.is_finite());
-    }
-    for texture in &scene.textures {
-        let texels = texture.width as usize * texture.height as usize;
-        assert!(texels > 0);
-        assert_eq!(
-            texels,
-            match &texture.texels {
-                Texels::Rgba8 { data, .. } => data.len(),
-                Texels::Rgba32F(data) => data.len(),
-            }
-        );
-    }
-    assert!(scene.origin_world.is_finite());
-    assert!(scene.cameras.iter().all(|c| c.position.is_finite() && c.world_from_camera.is_finite()));
-    let names: std::collections::HashSet<_> = scene.cameras.iter().map(|c| &c.name).collect();
-    assert_eq!(names.len(), scene.cameras.len());
-    assert_eq!(scene.blake3.len(), 64);
-    assert!(scene.warnings.iter().all(|w| !w.contains('\n')));
 }
 
 /// Geometric normal of a triangle, as its winding has it.
@@ -107,21 +64,4 @@ fn tetrahedron(node: Value) -> Gltf {
     node["mesh"] = json!(mesh);
     gltf.root(node);
     gltf
-}
-
-/// A copy with a few bytes changed or its end cut off.
-fn damage(bytes: &[u8], rng: &mut Pcg32) -> Vec<u8> {
-    let mut copy = bytes.to_vec();
-    for _ in 0..1 + rng.next_u32() % 4 {
-        let at = rng.next_u32() as usize % copy.len();
-        copy[at] = match rng.next_u32() % 3 {
-            0 => rng.next_u32() as u8,
-            1 => copy[at] ^ (1 << (rng.next_u32() % 8)),
-            _ => b"0123456789-\"[]{},"[rng.next_u32() as usize % 17],
-        };
-    }
-    if rng.next_u32().is_multiple_of(4) {
-        copy.truncate(rng.next_u32() as usize % copy.len());
-    }
-    copy
 }

@@ -13,6 +13,8 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
+use crate::needs::browser;
+
 /// Longest wait for something that the page is to do: only a hung page takes it.
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -57,27 +59,14 @@ pub struct Opened {
     _folder: TempDir,
 }
 
-fn find_browser() -> Option<PathBuf> {
-    if let Some(named) = std::env::var_os("CHROME") {
-        return Some(PathBuf::from(named));
-    }
-    let path = std::env::var_os("PATH")?;
-    let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
-    let names = ["chromium", "chromium-browser", "google-chrome"];
-    names.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name))).find(|file| file.is_file())
-}
-
 impl Opened {
-    /// Opens a page in a window of this size; `None`, said on stderr, where there is no browser.
-    pub fn new(html: &str, width: u32, height: u32) -> Option<Opened> {
+    /// Opens a page in a window of this size.
+    pub fn new(html: &str, width: u32, height: u32) -> Opened {
         Opened::with_scripts(html, width, height, true)
     }
 
-    pub fn with_scripts(html: &str, width: u32, height: u32, scripts: bool) -> Option<Opened> {
-        let Some(path) = find_browser() else {
-            eprintln!("SKIPPED: no chromium, chromium-browser or google-chrome on the path; install one or set CHROME");
-            return None;
-        };
+    pub fn with_scripts(html: &str, width: u32, height: u32, scripts: bool) -> Opened {
+        let path = browser().expect("tests that open a page run where there is a browser");
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("index.html");
         fs::write(&file, html).unwrap();
@@ -111,7 +100,7 @@ impl Opened {
         opened.call(ScriptsOff(json!({ "value": !scripts })));
         opened.resize(width, height);
         opened.tab.navigate_to(&opened.url).unwrap().wait_until_navigated().unwrap();
-        Some(opened)
+        opened
     }
 
     fn call<M: Method + Serialize>(&self, method: M) -> M::ReturnObject {

@@ -30,9 +30,8 @@ fn data(opened: &Opened, key: &str) -> f64 {
     opened.number(&format!("+document.getElementById('image-1').dataset.{key}"))
 }
 
-#[test]
-fn divide_zoom_and_exposure() {
-    let Some(opened) = Opened::new(&fixture::page(), 1280, 900) else { return };
+pub fn divide_zoom_and_exposure() {
+    let opened = Opened::new(&fixture::page(), 1280, 900);
     opened.show_image("image-1");
     let compare = "#image-1 canvas.compare";
     let at = |x, y| {
@@ -84,9 +83,8 @@ fn divide_zoom_and_exposure() {
     opened.assert_quiet();
 }
 
-#[test]
-fn both_views_zoom_together() {
-    let Some(opened) = Opened::new(&fixture::page(), 1280, 900) else { return };
+pub fn both_views_zoom_together() {
+    let opened = Opened::new(&fixture::page(), 1280, 900);
     opened.show_image("image-1");
     let heat_at = |x: f64, y: f64| opened.canvas_pixel("#image-1 canvas.heat", x, y);
     let [left, top, width, height] = opened.place("#image-1 canvas.compare");
@@ -143,9 +141,8 @@ fn both_views_zoom_together() {
     opened.assert_quiet();
 }
 
-#[test]
-fn gates_are_sorted_and_filtered() {
-    let Some(opened) = Opened::new(&fixture::page(), 1280, 900) else { return };
+pub fn gates_are_sorted_and_filtered() {
+    let opened = Opened::new(&fixture::page(), 1280, 900);
     let column = |selector: &str| {
         let texts = opened.eval(&format!(
             "[...document.querySelectorAll('tbody.gate:not(.off) {selector}')].map((cell) => cell.textContent)"
@@ -179,9 +176,8 @@ fn gates_are_sorted_and_filtered() {
     opened.assert_quiet();
 }
 
-#[test]
-fn a_keyboard_is_enough() {
-    let Some(opened) = Opened::new(&fixture::page(), 1280, 900) else { return };
+pub fn a_keyboard_is_enough() {
+    let opened = Opened::new(&fixture::page(), 1280, 900);
     opened.show_image("image-1");
     opened.eval("scrollTo({top: 0, behavior: 'instant'}), document.activeElement.blur()");
     let mut seen = Vec::new();

@@ -8,9 +8,8 @@ fn assert_fits(opened: &Opened, what: &str) {
     assert!(needed <= there, "{what}: the page is {needed} px wide in a window of {there} px");
 }
 
-#[test]
-fn the_page_fits_telephones_screens_and_paper() {
-    let Some(opened) = Opened::new(&fixture::page(), 1280, 900) else { return };
+pub fn the_page_fits_telephones_screens_and_paper() {
+    let opened = Opened::new(&fixture::page(), 1280, 900);
     for (width, height) in [(1280, 900), (390, 844), (320, 640)] {
         opened.resize(width, height);
         for colors in ["light", "dark"] {
@@ -45,9 +44,8 @@ fn the_page_fits_telephones_screens_and_paper() {
     opened.assert_quiet();
 }
 
-#[test]
-fn without_scripts_there_is_all_but_the_controls() {
-    let Some(opened) = Opened::with_scripts(&fixture::page(), 1280, 900, false) else { return };
+pub fn without_scripts_there_is_all_but_the_controls() {
+    let opened = Opened::with_scripts(&fixture::page(), 1280, 900, false);
     // The protocol evaluates although the page's own scripts are off.
     let is_shown =
         |selector: &str| opened.eval(&format!("document.querySelector('{selector}').checkVisibility()")) == true;

@@ -9,13 +9,18 @@ use crate::fixture;
 const MOST_BYTES: usize = 8_000_000;
 
 /// As a run of two cameras, beauty and irradiance each, without noise.
-#[test]
-fn a_full_hd_page_is_small_at_full_resolution() {
-    let html = fixture::large_page(4, 0.0);
-    eprintln!("four pairs of 1920 × 1080: {:.2} MB", html.len() as f64 / 1e6);
+fn full_hd_page() -> String {
+    fixture::large_page(4, 0.0)
+}
+
+pub fn a_full_hd_page_is_small_at_full_resolution() {
+    let html = full_hd_page();
     assert!(html.len() < MOST_BYTES, "{}", html.len());
     assert!(!html.contains("resolution, so that"), "pictures were shrunk");
-    let Some(opened) = Opened::new(&html, 1280, 900) else { return };
+}
+
+pub fn a_full_hd_page_loads() {
+    let opened = Opened::new(&full_hd_page(), 1280, 900);
     opened.eval("document.getElementById('image-1').scrollIntoView()");
     let start = Instant::now();
     opened.wait_for("document.getElementById('image-1').dataset.state === 'ready'");
@@ -25,10 +30,8 @@ fn a_full_hd_page_is_small_at_full_resolution() {
     opened.assert_quiet();
 }
 
-#[test]
-fn noise_costs_resolution_and_the_page_says_so() {
+pub fn noise_costs_resolution_and_the_page_says_so() {
     let html = fixture::large_page(3, 0.5);
-    eprintln!("three noisy pairs of 1920 × 1080: {:.2} MB", html.len() as f64 / 1e6);
     assert!(html.len() < MOST_BYTES, "{}", html.len());
     assert!(html.contains("Shown at 1/") && html.contains("Figures and histogram are of all pixels"));
 }

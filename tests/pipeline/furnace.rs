@@ -68,6 +68,19 @@ fn the_scene_of_the_repository() {
 }
 
 #[test]
+fn the_preset_of_paths() {
+    let folder = Folder::new();
+    // 256 directions of 64 paths: 0.11 % (rms) in the mean of a probe, so 0.5 % are more than four standard errors.
+    let words = "--preset path --set grid.divisions=(3,3,3) --set capture.resolution=16 \
+                 --set grid.bounds={\"min\":[-0.8,0.2,-0.8],\"max\":[0.8,1.8,0.8]} --set filter.irradiance_resolution=4";
+    // Without a bounce between probes: paths bring the light that was reflected, half of all of it.
+    let report = bake(&folder, &scene("furnace"), words).report;
+    assert_eq!(report["bounces"].as_array().map(Vec::len), Some(1), "probes were asked: {}", report["bounces"]);
+    let files = seeds(&folder, &scene("furnace"), words, 4);
+    check(&files, &files[0].active(), expected([1.0; 3], [0.5; 3]), "furnace.glb, preset path");
+}
+
+#[test]
 fn probes_of_the_default_grid_within_the_room() {
     // The default grid also has probes outside the room, which see no light. They lower the share of directions in
     // which emitters are seen, so that emitters are sampled and there is noise to test: 0.33 % (rms) in the mean of a

@@ -1,8 +1,6 @@
-//! The pipeline as its users meet it: the built program on scenes from `scenes/`, from the shared folder and built in
-//! code. What it writes is read by a decoder of the tests' own ([`probe_file`]), so that an error which bake and query
+//! The pipeline as its users meet it: the built program on scenes from `scenes/` and built in code. What it writes is read by a decoder of the tests' own ([`probe_file`]), so that an error which bake and query
 //! share cannot hide.
 
-mod adversarial;
 mod care;
 mod closed_forms;
 mod command_line;
@@ -21,4 +19,3 @@ mod program;
 mod reference;
 mod reports;
 mod shapes;
-mod truth;

@@ -153,12 +153,14 @@ impl Query<'_> {
         let irradiance = &self.volume.irradiance;
         // One direction serves all eight probes.
         let around = irradiance.around(oct);
-        let per_total = 1.0 / total;
+        // Crushed weights may be so small that the reciprocal of their sum overflows; their shares are the same.
+        let lift = if total < f32::MIN_POSITIVE { 1.0 / f32::MIN_POSITIVE } else { 1.0 };
+        let per_total = 1.0 / (total * lift);
         let mut sum = Vec3A::ZERO;
         for (probe, weight) in corners.probes.iter().zip(corners.weights) {
             if weight > 0.0 {
                 let irradiance = irradiance.at(probe.0 as usize, &around);
-                sum += self.settings.blend.forward(irradiance) * (weight * per_total);
+                sum += self.settings.blend.forward(irradiance) * (weight * lift * per_total);
             }
         }
         self.settings.blend.backward(sum).into()

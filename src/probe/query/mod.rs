@@ -11,6 +11,8 @@ mod corner_test;
 mod look_up;
 mod point;
 mod settings;
+#[cfg(test)]
+mod tests;
 
 pub use self::look_up::Query;
 pub use self::point::{BatchVisibility, CornerWeights, QueryPoint, Visibility};

@@ -20,7 +20,7 @@ use lightprobe::report::baked;
 use lightprobe::scene::{self, LoadOptions};
 use lightprobe::system::progress::Progress;
 
-use crate::common::shared_scenes;
+use crate::needs::shared_scenes;
 
 /// Blocks of the path tracer at each point and direction.
 const BLOCKS: u64 = 128;
@@ -48,17 +48,32 @@ fn mean_and_variance(values: &[f64]) -> (f64, f64) {
     (mean, values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n * (n - 1.0)))
 }
 
-/// Bakes `scene` coarsely and compares. `limit`: the iterated bake's own bias, at most.
-fn check(path: &Path, set: &[&str], limit: f64) {
+/// Bakes whose own bias is averaged: what of it is noise of the bake falls to half.
+const BAKES: u64 = 4;
+
+/// The iterated bake's own bias in one setting, in shares of the light: found with 24 seeds, each with a truth of its own
+/// (relocation, and so the probes' places, may depend on the seed).
+struct Bias {
+    mean: f64,
+    /// Standard deviation of one seed's, the noise of its truth included.
+    deviation: f64,
+}
+
+/// Bakes `scene` coarsely and compares. Light that is bounced between probes is interpolated between them, so the bake
+/// has a bias of its own that falls with their spacing (veach_ajar: −3.0 % here, −1.8 % at half the spacing). `usual`: what
+/// it may not exceed by more than four standard errors.
+fn check(path: &Path, set: &[&str], usual: &Bias) {
     let scene = scene::load(path, &LoadOptions::default()).expect("the scene");
     let set: Vec<String> = set.iter().map(|s| (*s).to_owned()).collect();
     let config = Config::default().with_overrides(&set).expect("the settings");
     let world = World::new(&scene, 1.0, config.materials.albedo_max).expect("Embree");
-    let circumstances =
-        Circumstances { seed: 3, memory_budget_bytes: None, progress: Progress::hidden(), checkpoint: None };
-    let record = SceneRecord { name: scene.name.clone(), blake3: scene.blake3.clone() };
-    let prepared = prepare(&world, &config, &circumstances).expect("a grid");
-    let volume = prepared.bake(&circumstances, &record).expect("a bake").volume;
+    let bake = |seed: u64| {
+        let circumstances = Circumstances::quiet(seed);
+        let record = SceneRecord { name: scene.name.clone(), blake3: scene.blake3.clone() };
+        let prepared = prepare(&world, &config, &circumstances).expect("a grid");
+        prepared.bake(&circumstances, &record).expect("a bake").volume
+    };
+    let volume = bake(3);
     let truth = Truth::trace(&world, &config.capture, &volume, 2, 5, Progress::hidden());
 
     let resolution = config.store.irradiance.fineness().resolution;
@@ -96,22 +111,32 @@ fn check(path: &Path, set: &[&str], limit: f64) {
         variance.sqrt()
     );
     assert_eq!(truth.runs.len() as u64, RUNS);
-    let (figures, errors) = baked::measure(&volume, &truth);
+    let (figures, _) = baked::measure(&volume, &truth);
     let bias = figures.bias.expect("there is light");
-    assert!(bias.abs() <= limit, "the bake's own bias {bias} ± {:?}", errors.bias);
     // The parts make up the whole; the correction for noise is the same in both.
     let (light, dark) = (figures.light.expect("light"), figures.dark.expect("light"));
     assert!((light - dark - bias).abs() < 1e-9 + light.min(dark) * 1e-6, "{light} − {dark} ≠ {bias}");
+
+    let own_bias = |seed: u64| {
+        let volume = bake(seed);
+        let truth = Truth::trace(&world, &config.capture, &volume, 2, seed + 2, Progress::hidden());
+        baked::measure(&volume, &truth).0.bias.expect("there is light")
+    };
+    let others = (1..BAKES).map(|i| own_bias(3 + i));
+    let biases: Vec<f64> = std::iter::once(bias).chain(others).collect();
+    let mean = biases.iter().sum::<f64>() / biases.len() as f64;
+    let error = usual.deviation * (1.0 / biases.len() as f64 + 1.0 / 24.0).sqrt();
+    // Four standard errors: once in 30,000 if nothing has changed.
+    let limit = usual.mean.abs() + 4.0 * error;
+    assert!(mean.abs() <= limit, "the bake's own bias {mean} ± {error} is above {limit}; of the bakes {biases:?}");
 }
 
-#[test]
-fn cornell_probes_hold_what_paths_bring() {
+pub fn cornell_probes_hold_what_paths_bring() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.glb");
-    check(&path, &["grid.spacing_m=0.5"], 0.03);
+    check(&path, &["grid.spacing_m=0.5"], &Bias { mean: -0.0105, deviation: 0.0035 });
 }
 
-#[test]
-fn probes_behind_a_door_ajar_hold_what_paths_bring() {
-    let Some(scenes) = shared_scenes() else { return };
-    check(&scenes.join("veach_ajar/veach_ajar.glb"), &["grid.divisions=(8,4,8)"], 0.25);
+pub fn probes_behind_a_door_ajar_hold_what_paths_bring() {
+    let path = shared_scenes().join("veach_ajar/veach_ajar.glb");
+    check(&path, &["grid.divisions=(8,4,8)"], &Bias { mean: -0.0300, deviation: 0.0095 });
 }

@@ -1,0 +1,9 @@
+//! Tests of the query on volumes built in code.
+//!
+//! [`furnace`] knows the answer under every combination of settings; [`by_hand`] and [`corners`] know it
+//! for each formula alone.
+
+mod by_hand;
+mod corners;
+mod fixture;
+mod furnace;

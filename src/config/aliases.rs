@@ -46,10 +46,11 @@ pub fn today(path: &str, value: &str) -> Option<Vec<(String, String)>> {
         ("query.visibility", ("none", "")) => {
             set(&[("store.occlusion", "none".to_owned()), ("query.test", "none".to_owned())])
         }
-        ("query.visibility", ("moments", settings)) if !settings.is_empty() => {
+        ("query.visibility", ("moments", settings)) => {
             set(&[("store.occlusion", "moments()".to_owned()), ("query.test", format!("chebyshev{settings}"))])
         }
-        ("query.visibility", ("surface", settings)) if !settings.is_empty() => {
+        ("query.visibility", ("surface", settings)) => {
+            let settings = if settings.is_empty() { "()" } else { settings };
             set(&[("store.occlusion", format!("surface{settings}")), ("query.test", "table()".to_owned())])
         }
         _ => None,

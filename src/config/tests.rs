@@ -153,7 +153,7 @@ fn mistakes_are_named() {
         ("solver.albedo_max=2", "not including 1"),
         ("grid.spacing_m.x=1", "has no keys"),
         ("encoding.irradiance=f61", "did you mean 'f16'"),
-        ("query.visibility=surface", "surface(voxels_per_cell: 8)"),
+        ("query.visibility=moments", "chebyshev(power: 3, floor: 0.05)"),
         ("query.direction=cosine", "cosine(floor: 0.05)"),
         ("query.test=chebyshev", "chebyshev(power: 3, floor: 0.05)"),
         ("store.occlusion=surface(voxels: 8)", "did you mean 'voxels_per_cell'"),

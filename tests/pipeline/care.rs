@@ -156,7 +156,7 @@ fn mistyped_values() {
     let furnace = scene("furnace");
     let folder = Folder::new();
     for (set, words) in [
-        ("query.visibility=surface", &["surface(voxels_per_cell: 8)"][..]),
+        ("query.visibility=moments", &["chebyshev(power: 3, floor: 0.05)"][..]),
         ("query.direction=cosine", &["cosine(floor: "]),
         ("encoding.irradiance=f61", &["did you mean 'f16'"]),
         ("grid.divisions=(0,1,1)", &["--set grid.divisions=(0,1,1)"]),

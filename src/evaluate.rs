@@ -74,12 +74,14 @@ impl Scenery<'_, '_> {
         let exact = irradiance(query, points, masks, VisibilityMode::Ray);
         VisibilityMode::ALL.map(|mode| {
             let irradiance = irradiance(query, points, masks, mode);
+            let lookup = Some(time_lookup(query, points, masks, mode)).filter(|runs| !runs.is_empty()).map(Timing::of);
             let ray_s = if mode == VisibilityMode::Ray { self.primary_s + masks_s } else { self.primary_s };
             let report = MethodReport {
                 name: mode.name(),
                 shade_ms: Timing::of(time_shading(query, points, masks, mode)),
                 ray_ms: ray_s * 1e3,
-                lookup_ns: time_lookup(query, points, masks, mode),
+                lookup_ns: lookup.map(|lookup| lookup.median),
+                lookup_spread_ns: lookup,
                 bytes_per_probe,
                 irradiance_indirect_mean: mean_luminance(self.view, &irradiance),
                 leak: leak::measure(query, points, masks, mode, &irradiance, &exact),

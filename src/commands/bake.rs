@@ -10,7 +10,7 @@ use super::session::{Opening, Session, resolve_config};
 use super::{Console, tell, write_json};
 use crate::bake::{Baked, Checkpoint, Circumstances, Prepared, prepare};
 use crate::cli::BakeArgs;
-use crate::config::{Config, PlanMode, presets};
+use crate::config::{Config, presets};
 use crate::plan::Line;
 use crate::probe::lattice::ProbeState;
 use crate::probe::transport::checkpoint;
@@ -70,7 +70,7 @@ fn opening<'a>(args: &'a BakeArgs, config: &Config) -> Result<Opening<'a>> {
         scene: args.scene.as_deref().context("no scene: give a .glb or .gltf file")?,
         trace: &args.trace,
         light: config.light(),
-        keep_images: config.plan.mode == PlanMode::KeepEverything,
+        keep_images: config.plan.keeps_everything(),
         inputs: config_file.into_iter().collect(),
         outputs: outputs(args)?,
     })

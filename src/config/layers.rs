@@ -92,7 +92,7 @@ impl Layers {
             return invalid(last.map_or(place, |a| &a.place), what);
         }
         match config.query.mismatch(&config.store.occlusion) {
-            Some(what) => invalid(place, what.to_owned()),
+            Some(what) => invalid(place, what),
             None => Ok(config),
         }
     }

@@ -87,9 +87,13 @@ pub const STAGES: &[&str] = &[
 pub const VISIBILITY: &str = "visibility";
 
 impl PlanSettings {
+    pub fn keeps_everything(&self) -> bool {
+        self.mode == PlanMode::KeepEverything
+    }
+
     /// Whether a stage is computed and stored even where the scene does not need it.
     pub fn keeps(&self, stage: &str) -> bool {
-        self.mode == PlanMode::KeepEverything || self.keep.iter().any(|kept| kept == stage)
+        self.keeps_everything() || self.keep.iter().any(|kept| kept == stage)
     }
 }
 

@@ -70,6 +70,8 @@ pub struct MethodReport {
     pub ray_ms: f64,
     /// One query on one thread.
     pub lookup_ns: Option<f64>,
+    /// The same, with how far its runs differ.
+    pub lookup_spread_ns: Option<Timing>,
     /// At run time, after the plan.
     pub bytes_per_probe: f64,
     /// Mean over the pixels that show a surface, luminance, W·m⁻².

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::points::ImagePoint;
 use crate::light::World;
-use crate::probe::query::{Query, Visibility};
+use crate::probe::query::{BatchVisibility, Query, QueryPoint, Visibility};
 use crate::trace::Ray;
 
 /// Number of times that shading is repeated to measure its time.
@@ -49,6 +49,15 @@ impl VisibilityMode {
             VisibilityMode::Ray => Visibility::Exact(mask),
         }
     }
+
+    /// The same for many points with a mask each.
+    pub fn of_batch(self, masks: &[u8]) -> BatchVisibility<'_> {
+        match self {
+            VisibilityMode::Off => BatchVisibility::Off,
+            VisibilityMode::On => BatchVisibility::Stored,
+            VisibilityMode::Ray => BatchVisibility::Exact(masks),
+        }
+    }
 }
 
 /// For every point, which of its eight probes it sees: bit i is set if the probe of corner i is active and visible.
@@ -79,7 +88,18 @@ pub fn exact_masks(world: &World, query: &Query, points: &[ImagePoint]) -> Vec<u
 
 /// Irradiance from the probes at every point, W·m⁻².
 pub fn irradiance(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<Vec3> {
-    points.par_iter().zip(masks).map(|(point, &mask)| query.irradiance(&point.query(), mode.visibility(mask))).collect()
+    let mut out = vec![Vec3::ZERO; points.len()];
+    let chunks = out.par_chunks_mut(BATCH).zip(points.par_chunks(BATCH).zip(masks.par_chunks(BATCH)));
+    chunks.for_each(|(out, (points, masks))| ask(query, points, masks, mode, out));
+    out
+}
+
+/// Points that one task asks for at a time.
+const BATCH: usize = 256;
+
+fn ask(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode, out: &mut [Vec3]) {
+    let asking: Vec<QueryPoint> = points.iter().map(ImagePoint::query).collect();
+    query.batch(&asking, mode.of_batch(masks), out);
 }
 
 /// Milliseconds for querying and shading all points, one entry per run.
@@ -88,9 +108,12 @@ pub fn time_shading(query: &Query, points: &[ImagePoint], masks: &[u8], mode: Vi
     (0..RUNS)
         .map(|_| {
             let started = Instant::now();
-            radiance.par_iter_mut().zip(points.par_iter().zip(masks)).for_each(|(out, (point, &mask))| {
-                let indirect = query.irradiance(&point.query(), mode.visibility(mask));
-                *out = super::layers::beauty(point, indirect);
+            let chunks = radiance.par_chunks_mut(BATCH).zip(points.par_chunks(BATCH).zip(masks.par_chunks(BATCH)));
+            chunks.for_each(|(out, (points, masks))| {
+                ask(query, points, masks, mode, out);
+                for (out, point) in out.iter_mut().zip(points) {
+                    *out = super::layers::beauty(point, *out);
+                }
             });
             std::hint::black_box(&radiance);
             started.elapsed().as_secs_f64() * 1e3
@@ -98,13 +121,16 @@ pub fn time_shading(query: &Query, points: &[ImagePoint], masks: &[u8], mode: Vi
         .collect()
 }
 
-/// Nanoseconds of one look-up on one thread. `None` without points.
-pub fn time_lookup(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Option<f64> {
+/// Nanoseconds of one look-up on one thread, one entry per run; none without points.
+pub fn time_lookup(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<f64> {
     let step = points.len().div_ceil(LOOKUP_POINTS).max(1);
     let chosen: Vec<_> = points.iter().zip(masks).step_by(step).map(|(p, &mask)| (p.query(), mask)).collect();
-    let started = Instant::now();
-    for (point, mask) in &chosen {
-        std::hint::black_box(query.irradiance(point, mode.visibility(*mask)));
-    }
-    (!chosen.is_empty()).then(|| started.elapsed().as_secs_f64() * 1e9 / chosen.len() as f64)
+    let run = |_| {
+        let started = Instant::now();
+        for (point, mask) in &chosen {
+            std::hint::black_box(query.irradiance(point, mode.visibility(*mask)));
+        }
+        started.elapsed().as_secs_f64() * 1e9 / chosen.len() as f64
+    };
+    if chosen.is_empty() { Vec::new() } else { (0..RUNS).map(run).collect() }
 }

@@ -130,6 +130,24 @@ fn emission_gathered_through_the_probes() {
     check(&files, &files[0].active(), expected([1.0; 3], [0.5; 3]), "gathered");
 }
 
+/// What `reference --max-bounces b` gives in the same room: π·Le·Σρᵏ, k from 0 to b. However emission is found.
+#[test]
+fn a_number_of_bounces_is_that_of_the_reference() {
+    let folder = Folder::new();
+    let mut gltf = Gltf::new();
+    let albedo = 0.5f64;
+    add(&mut gltf, &room(1), diffuse([albedo; 3], [1.0; 3]));
+    let scene = save(gltf, &folder, "room");
+    for bounces in 0..4 {
+        let sum: f64 = (0..=bounces).map(|k| albedo.powi(k)).sum();
+        for emission in ["sampled", "gathered"] {
+            let words = format!("{INSIDE} --set transport.bounces.max_bounces={bounces} --set capture.emission={emission}");
+            let files = seeds(&folder, &scene, &words, 2);
+            check_means(&files, &files[0].active(), [PI * sum; 3], &format!("{bounces} bounces, {emission}"));
+        }
+    }
+}
+
 #[test]
 fn one_percent_matters_at_high_albedo() {
     // At 0.98 a bounce operator 1 % too weak would give a third less, and 1 % too strong twice as much.

@@ -12,6 +12,7 @@ mod decoding;
 mod determinism;
 mod distances;
 mod furnace;
+mod layers;
 mod leaks;
 mod plan;
 mod probe_file;

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use crate::bake::{self, Circumstances};
 use crate::cli::{EqualName, SweepArgs};
 use crate::commands::session::set_sky;
-use crate::config::{Config, PlanMode, presets};
+use crate::config::{Config, presets};
 use crate::light::World;
 use crate::scene::Scene;
 use crate::sweep::ladder::{Ladder, LadderFile, Method, check_shared, expand};
@@ -66,7 +66,7 @@ pub fn configurations(args: &SweepArgs, file: Option<&LadderFile>) -> Vec<Named>
 pub fn shared(ladders: &[Ladder]) -> Result<(&Config, bool)> {
     let configs = || ladders.iter().flat_map(|ladder| &ladder.rungs).map(|rung| &rung.config);
     let first = configs().next().context("there is no configuration to run")?;
-    Ok((first, configs().any(|config| config.plan.mode == PlanMode::KeepEverything)))
+    Ok((first, configs().any(|config| config.plan.keeps_everything())))
 }
 
 /// Refuses what cannot be baked, before anything is traced.

@@ -120,13 +120,14 @@ pub fn query(config: &str) -> Result<QueryRecord, String> {
     let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME);
     let old: OldConfig = options.from_str(config).map_err(|e| format!("metadata 'config': {e}"))?;
     let q = old.query;
-    let test = match q.visibility {
-        OldVisibility::None => VisibilityTest::None,
-        OldVisibility::Moments { power, floor } => VisibilityTest::Chebyshev { power, floor },
-        OldVisibility::Surface { .. } => VisibilityTest::Table(TableTest { reach_voxels: 3, strip: 0.25 }),
-    };
     // Only Chebyshev's test saw the shifted point.
-    let sees_bias = matches!(test, VisibilityTest::Chebyshev { .. });
+    let (test, sees_bias) = match q.visibility {
+        OldVisibility::None => (VisibilityTest::None, false),
+        OldVisibility::Moments { power, floor } => (VisibilityTest::Chebyshev { power, floor }, true),
+        OldVisibility::Surface { .. } => {
+            (VisibilityTest::Table(TableTest { reach_voxels: 3, strip: 0.25 }), false)
+        }
+    };
     let bias = |bias: f32| if sees_bias { bias } else { 0.0 };
     Ok(QueryRecord {
         version: QUERY_VERSION,

@@ -10,6 +10,8 @@ mod settings;
 mod settle;
 mod stage;
 pub mod survey;
+#[cfg(test)]
+mod tests;
 
 pub use self::placement::{Placement, PlacementTask};
 pub use self::settings::{PlacementRule, PlacementSettings, SettleSettings, SurveySettings};

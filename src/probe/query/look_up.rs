@@ -8,7 +8,6 @@ use super::settings::{QuerySettings, VisibilityTest};
 use crate::math::octahedral::oct_from_direction;
 use crate::probe::Volume;
 use crate::probe::lattice::grid::{Cell, ProbeIndex};
-use crate::probe::store::Occlusion;
 
 /// A volume and the way to ask it.
 #[derive(Clone, Copy)]
@@ -17,32 +16,45 @@ pub struct Query<'v> {
     pub settings: &'v QuerySettings,
 }
 
-/// Calls `$body` with `$test` bound to the one test that the query, and the mode, ask for: the loop in it is compiled for
-/// each.
+/// The test that a look-up makes.
+enum Test<'v> {
+    Mask(Mask),
+    Moments(MomentsTest<'v>),
+    Surface(SurfaceTest<'v>),
+}
+
+/// Calls `$body` with `$test` bound to the query's test: the loop in it is compiled for each.
 macro_rules! with_test {
     ($query:expr, $visibility:expr, |$test:ident| $body:expr) => {
-        match ($visibility, &$query.volume.occlusion, $query.settings.test) {
-            (Visibility::Stored, Occlusion::Moments(maps), VisibilityTest::Chebyshev { power, floor }) => {
-                let $test = MomentsTest { maps, positions: &$query.volume.positions, power, floor };
-                $body
-            }
-            (Visibility::Stored, Occlusion::Surface(table), VisibilityTest::Table(test)) => {
-                let $test = SurfaceTest { table, test };
-                $body
-            }
-            (Visibility::Exact(mask), ..) => {
-                let $test = Mask(mask);
-                $body
-            }
-            (Visibility::Off | Visibility::Stored, ..) => {
-                let $test = Mask(u8::MAX);
-                $body
-            }
+        match $query.test($visibility) {
+            Test::Mask($test) => $body,
+            Test::Moments($test) => $body,
+            Test::Surface($test) => $body,
         }
     };
 }
 
-impl Query<'_> {
+impl<'v> Query<'v> {
+    /// The test that the mode and the settings ask for. Where nothing is stored everything is visible.
+    #[inline]
+    fn test(&self, visibility: Visibility) -> Test<'v> {
+        let Volume { occlusion, positions, .. } = self.volume;
+        let found = match visibility {
+            Visibility::Off => None,
+            Visibility::Exact(mask) => Some(Test::Mask(Mask(mask))),
+            Visibility::Stored => match self.settings.test {
+                VisibilityTest::None => None,
+                VisibilityTest::Chebyshev { power, floor } => {
+                    occlusion.moments().map(|maps| Test::Moments(MomentsTest { maps, positions, power, floor }))
+                }
+                VisibilityTest::Table(test) => {
+                    occlusion.surface().map(|table| Test::Surface(SurfaceTest { table, test }))
+                }
+            },
+        };
+        found.unwrap_or(Test::Mask(Mask(u8::MAX)))
+    }
+
     /// The shifted point P′.
     #[inline]
     fn biased(&self, point: &QueryPoint) -> Vec3 {
@@ -68,13 +80,9 @@ impl Query<'_> {
     /// Which corners of its cell the stored table says that a point sees, where it is all the test there is: it then needs to
     /// be looked up only once. 0 where it says none, or there is more to the test.
     pub fn stored_mask(&self, point: &QueryPoint) -> u8 {
-        match (&self.volume.occlusion, self.settings.test) {
-            (Occlusion::Surface(table), VisibilityTest::Table(test)) => {
-                let biased = self.biased(point);
-                SurfaceTest { table, test }.seen(&self.volume.grid, &self.cell_of(point, biased), point, biased).mask
-            }
-            _ => 0,
-        }
+        let Test::Surface(test) = self.test(Visibility::Stored) else { return 0 };
+        let biased = self.biased(point);
+        test.seen(&self.volume.grid, &self.cell_of(point, biased), point, biased).mask
     }
 
     #[inline]

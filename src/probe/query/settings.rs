@@ -105,17 +105,10 @@ impl QuerySettings {
     }
 
     /// Why this test cannot be asked of that store, with the remedy; `None` where it can.
-    pub fn mismatch(&self, store: &OcclusionStore) -> Option<&'static str> {
-        match (store, &self.test) {
-            (OcclusionStore::None, VisibilityTest::None)
-            | (OcclusionStore::Moments(_), VisibilityTest::Chebyshev { .. })
-            | (OcclusionStore::Surface(_), VisibilityTest::Table(_)) => None,
-            (OcclusionStore::None, _) => Some("store.occlusion is none: query.test must be none too"),
-            (OcclusionStore::Moments(_), _) => {
-                Some("store.occlusion is moments: query.test must be chebyshev(power: p, floor: f)")
-            }
-            (OcclusionStore::Surface(_), _) => Some("store.occlusion is surface: query.test must be table()"),
-        }
+    pub fn mismatch(&self, store: &OcclusionStore) -> Option<String> {
+        let (test, written) = store.test();
+        let remedy = || format!("store.occlusion is {}: query.test must be {written}", store.name());
+        (self.test.name() != test).then(remedy)
     }
 
     /// Calls `rule(key, value, holds, rule)` for every number in it.
@@ -143,6 +136,17 @@ impl QuerySettings {
                 unit("query.test.table.strip", strip);
                 rule("query.test.table.reach_voxels", reach_voxels.to_string(), reach_voxels <= 22, "use 0 to 22");
             }
+        }
+    }
+}
+
+impl VisibilityTest {
+    /// Name in configurations.
+    pub fn name(&self) -> &'static str {
+        match self {
+            VisibilityTest::None => "none",
+            VisibilityTest::Chebyshev { .. } => "chebyshev",
+            VisibilityTest::Table(_) => "table",
         }
     }
 }

@@ -55,6 +55,24 @@ impl OcclusionStore {
         matches!(self, OcclusionStore::Surface(_))
     }
 
+    /// Name in configurations.
+    pub fn name(&self) -> &'static str {
+        match self {
+            OcclusionStore::None => "none",
+            OcclusionStore::Moments(_) => "moments",
+            OcclusionStore::Surface(_) => "surface",
+        }
+    }
+
+    /// The visibility test of a look-up that can ask it, by its name, and how that is written.
+    pub fn test(&self) -> (&'static str, &'static str) {
+        match self {
+            OcclusionStore::None => ("none", "none"),
+            OcclusionStore::Moments(_) => ("chebyshev", "chebyshev(power: p, floor: f)"),
+            OcclusionStore::Surface(_) => ("table", "table()"),
+        }
+    }
+
     pub fn is_none(&self) -> bool {
         *self == OcclusionStore::None
     }
@@ -186,6 +204,18 @@ impl OcclusionBuilder {
 }
 
 impl Occlusion {
+    /// Distance maps, where there are any.
+    #[inline]
+    pub fn moments(&self) -> Option<&OctahedralMaps<Vec2>> {
+        if let Occlusion::Moments(maps) = self { Some(maps) } else { None }
+    }
+
+    /// The table of visibility at surfaces, where there is one.
+    #[inline]
+    pub fn surface(&self) -> Option<&SurfaceVisibility> {
+        if let Occlusion::Surface(table) = self { Some(table) } else { None }
+    }
+
     /// Bytes per probe in the layout that shading uses.
     pub fn runtime_bytes(&self, probes: usize) -> f64 {
         match self {

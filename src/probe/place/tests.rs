@@ -1,0 +1,188 @@
+//! Placement and survey in scenes whose walls are known.
+
+use glam::Vec3;
+
+use super::need::far_probes;
+use super::settle::settle_all;
+use super::survey::Survey;
+use super::*;
+use crate::light::World;
+use crate::probe::lattice::grid::{GridSettings, ProbeIndex};
+use crate::probe::lattice::{Grid, ProbeState};
+use crate::probe::store::OcclusionStore;
+use crate::scene::{self, LoadOptions, Scene};
+use crate::trace::Ray;
+
+fn scene(name: &str) -> Scene {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.glb"));
+    scene::load(&path, &LoadOptions::default()).unwrap()
+}
+
+fn grid(scene: &Scene, spacing_m: f64) -> Grid {
+    Grid::new(&GridSettings { spacing_m: Some(spacing_m), ..Default::default() }, scene).unwrap()
+}
+
+fn settle(settings: SettleSettings) -> PlacementSettings {
+    PlacementSettings { rule: PlacementRule::Settle(settings), ..Default::default() }
+}
+
+fn placed(world: &World, grid: &Grid, settings: &PlacementSettings) -> Placement {
+    let occlusion = OcclusionStore::default();
+    place(world, &PlacementTask { grid, settings, occlusion: &occlusion, reach: 0.0, seed: 1 }, || {})
+}
+
+/// Whether something lies between two points, from either end.
+fn blocked(world: &World, from: Vec3, to: Vec3) -> bool {
+    world.tracer.occluded(Ray::segment(from, to, 0)) && world.tracer.occluded(Ray::segment(to, from, 0))
+}
+
+#[test]
+fn probes_settle_in_the_open_and_near_their_grid_points() {
+    let scene = scene("cornell");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let grid = grid(&scene, 0.25);
+    let rule = SettleSettings::default();
+    let settings = settle(rule.clone());
+    let occlusion = OcclusionStore::None;
+    let task = PlacementTask { grid: &grid, settings: &settings, occlusion: &occlusion, reach: 0.0, seed: 1 };
+    let placement = settle_all(&world, &task);
+    let settler = Settler { world: &world, grid: &grid, settings: &rule };
+    let mut moved = 0;
+    for (probe, (&state, &position)) in placement.states.iter().zip(&placement.positions).enumerate() {
+        let grid_point = grid.grid_point(ProbeIndex(probe as u32));
+        let distance = position.distance(grid_point);
+        // A rounding beside the bound.
+        assert!(distance <= rule.max_move * 0.25 + 1e-6, "probe {probe} moved by {distance} m");
+        match state {
+            ProbeState::Active => assert!(!settler.is_inside(&settler.look(position)), "probe {probe} is inside"),
+            _ => assert_eq!(distance, 0.0, "probe {probe} is not baked and stands elsewhere"),
+        }
+        moved += usize::from(distance > 0.0);
+    }
+    assert_eq!(moved, placement.relocated);
+    assert!(moved > 0 && placement.count(ProbeState::InsideGeometry) > 0, "the blocks hold some, and touch others");
+}
+
+#[test]
+fn rules_that_move_nothing_leave_probes_at_their_grid_points() {
+    let scene = scene("cornell");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let grid = grid(&scene, 0.25);
+    let still = settle(SettleSettings { relocate: false, ..Default::default() });
+    let points = PlacementSettings { rule: PlacementRule::GridPoints, keep_unsampled: true, ..Default::default() };
+    for settings in [&still, &points] {
+        let placement = placed(&world, &grid, settings);
+        assert!(grid.probes().all(|p| placement.positions[p.0 as usize] == grid.grid_point(p)));
+        assert_eq!((placement.relocated, settings.rule.moves()), (0, false));
+    }
+    // Grid points count wherever they are: inside a block too.
+    let inside = placed(&world, &grid, &still).count(ProbeState::InsideGeometry);
+    assert!(inside > 0);
+    assert_eq!(placed(&world, &grid, &points).count(ProbeState::Active), grid.probe_count());
+}
+
+/// The wall at x = 0 is whole: no entry on one side of it sees a probe on the other.
+#[test]
+fn no_surface_sees_through_a_wall() {
+    let scene = scene("two_rooms_sealed");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let grid = grid(&scene, 1.0);
+    let placement = placed(&world, &grid, &PlacementSettings::default());
+    let table = placement.survey.as_ref().unwrap();
+    let (mut seen, mut hidden) = (0, 0);
+    for cell in grid.cells() {
+        let (low, sides) = grid.cell_box(cell);
+        let probes = grid.corners(cell);
+        for entry in table.entries(cell) {
+            let middle = low + (entry.voxel.as_vec3() + 0.5) / table.voxels_per_cell as f32 * sides;
+            // The room that the surface faces: the wall is 0.1 m thick, a voxel 0.125 m.
+            let facing = middle.x + entry.facing.x * 0.2;
+            if facing.abs() < 0.15 {
+                continue;
+            }
+            for (i, probe) in probes.iter().enumerate() {
+                let position = placement.positions[probe.0 as usize];
+                let across = position.x * facing < 0.0;
+                let visible = entry.mask >> i & 1 == 1;
+                assert!(!(across && visible), "{middle} facing {} sees {position}", entry.facing);
+                seen += usize::from(visible);
+                hidden += usize::from(across);
+            }
+        }
+    }
+    assert!(seen > 1000 && hidden > 1000, "{seen} seen, {hidden} behind the wall");
+}
+
+/// Entries that see none of their eight probes get one that they see, from the cells around.
+#[test]
+fn far_probes_are_seen_and_not_too_far() {
+    let scene = scene("office");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let grid = grid(&scene, 1.5);
+    let settings = PlacementSettings::default();
+    let placement = placed(&world, &grid, &settings);
+    let table = placement.survey.as_ref().unwrap();
+    assert!(!table.far.is_empty());
+    let mut entry_of = vec![None; table.keys.len()];
+    for cell in grid.cells() {
+        table.entries(cell).for_each(|entry| entry_of[entry.index] = Some((cell, entry)));
+    }
+    let mut met = 0;
+    for &(index, probe) in &table.far {
+        let (cell, entry) = entry_of[index as usize].unwrap();
+        assert_eq!(entry.mask, 0);
+        assert_eq!(placement.states[probe as usize], ProbeState::Active);
+        let near = (1..=settings.survey.far_rings).any(|ring| grid.ring(cell, ring).any(|p| p.0 == probe));
+        assert!(near, "probe {probe} of {cell:?}");
+        // Some point of the voxel sees it: its middle off the surface, or one of the corners of its open face.
+        let (low, sides) = grid.cell_box(cell);
+        let voxel = sides / table.voxels_per_cell as f32;
+        let middle = low + (entry.voxel.as_vec3() + 0.5) * voxel;
+        let offsets = (0..27).map(|i| Vec3::new((i % 3) as f32 - 1.0, (i / 3 % 3) as f32 - 1.0, (i / 9) as f32 - 1.0));
+        let position = placement.positions[probe as usize];
+        met += usize::from(offsets.into_iter().any(|o| !blocked(&world, middle + o * voxel * 0.5, position)));
+    }
+    // The voxel's 27 points need not include the one that the survey found; nearly always they do.
+    assert!(met * 10 >= table.far.len() * 9, "{met} of {}", table.far.len());
+    // The same every time.
+    assert_eq!(far_probes(&world, &grid, &placement, table, &settings.survey), table.far);
+}
+
+#[test]
+fn the_survey_agrees_with_rays_of_its_own() {
+    let scene = scene("cornell");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let grid = grid(&scene, 0.5);
+    let placement = placed(&world, &grid, &PlacementSettings::default());
+    let survey = |seed| Survey::run(&world, &grid, &placement, 8, &SurveySettings::default(), seed).table;
+    let (a, b) = (survey(1), survey(2));
+    // Other points, the same surfaces: keys agree, and most masks.
+    let shared: Vec<(u8, u8)> = grid
+        .cells()
+        .flat_map(|cell| {
+            let of_b: Vec<_> = b.entries(cell).collect();
+            let pair = |e: crate::probe::store::surface::Entry| {
+                let other = of_b.iter().find(|o| (o.voxel, o.facing) == (e.voxel, e.facing))?;
+                Some((e.mask, other.mask))
+            };
+            a.entries(cell).filter_map(pair).collect::<Vec<_>>()
+        })
+        .collect();
+    assert!(shared.len() * 100 >= a.keys.len() * 97, "{} of {}", shared.len(), a.keys.len());
+    let bits: u32 = shared.iter().map(|(a, b)| (a ^ b).count_ones()).sum();
+    // Voxels that an edge of shadow crosses may go either way: 1 % of bits.
+    assert!(f64::from(bits) < 0.01 * 8.0 * shared.len() as f64, "{bits} of {} bits", 8 * shared.len());
+    assert_eq!(survey(1), a);
+}
+
+#[test]
+fn memory_is_estimated_from_above() {
+    let scene = scene("two_rooms_open");
+    let grid = grid(&scene, 1.0);
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let placement = placed(&world, &grid, &PlacementSettings::default());
+    let table = placement.survey.unwrap();
+    let estimate = survey::estimated_bytes(&scene.mesh, &grid, 8);
+    // At least what the table's own entries took on the way, and no wild guess.
+    assert!(estimate > table.bytes() && estimate < 1000 * table.bytes(), "{estimate} for {}", table.bytes());
+}

@@ -16,7 +16,7 @@ use crate::probe::store::layout;
 use crate::probe::transport::truth::Truth;
 use crate::report::baked::{self, BakedReport};
 use crate::report::reference_layers::ReferenceLayers;
-use crate::report::render::{MethodReport, Spread};
+use crate::report::render::{MethodReport, Timing};
 use crate::report::{error, leak};
 use crate::scene::Scene;
 use crate::shade::layers::compose;
@@ -81,7 +81,7 @@ impl Scenery<'_, '_> {
             let ray_s = if method == Method::Ray { self.primary_s + masks_s } else { self.primary_s };
             let report = MethodReport {
                 name: method.name(),
-                shade_ms: Spread::of(time_shading(query, points, masks, method)),
+                shade_ms: Timing::of(time_shading(query, points, masks, method)),
                 ray_ms: ray_s * 1e3,
                 lookup_ns: time_lookup(query, points, masks, method),
                 bytes_per_probe,

@@ -7,7 +7,7 @@ use std::process::Command;
 
 use glam::Vec3;
 use lightprobe::image::{ImageError, LayeredImage, Picture, Picture8};
-use lightprobe::report::colormap::{Colormap, MISSING, Scale};
+use lightprobe::report::colormap::{MISSING, color};
 use lightprobe::report::heatmap::{Heatmap, range_of};
 use lightprobe::system::output::write_atomically;
 use proptest::prelude::*;
@@ -272,50 +272,49 @@ fn outputs_honour_the_umask() {
     }
 }
 
-fn heatmap(values: &[f32], width: u32, height: u32, scale: Scale) -> Heatmap<'_> {
-    let range = range_of(values, scale);
-    Heatmap { values, width, height, range, scale, title: "Leaked light", unit: "W·m⁻²", missing: "no surface" }
+/// Height of a legend at zoom 1.
+const LEGEND_HEIGHT: u32 = 82;
+
+fn heatmap(values: &[f32], width: u32, height: u32) -> Picture8 {
+    let range = range_of(values);
+    Heatmap { values, width, height, range, title: "Leaked light", unit: "W·m⁻²", missing: "no surface" }.draw()
 }
 
 #[test]
 fn a_heatmap_keeps_its_map_pixel_for_pixel() {
     let values: Vec<f32> = (0..640 * 360).map(|i| (i % 640) as f32 / 639.0).collect();
-    let drawn = heatmap(&values, 640, 360, Scale::Sequential).draw();
-    assert_eq!((drawn.map_scale, drawn.map.x, drawn.map.y), (1, 0, 0));
-    assert_eq!((drawn.map.width, drawn.map.height), (640, 360));
-    assert_eq!((drawn.picture.width, drawn.picture.height), (640, 442));
-    let colormap = Colormap::new(Scale::Sequential, [0.0, 1.0]);
+    let drawn = heatmap(&values, 640, 360);
+    assert_eq!((drawn.width, drawn.height), (640, 360 + LEGEND_HEIGHT));
     for (x, y) in [(0, 0), (639, 0), (320, 180), (17, 359)] {
-        assert_eq!(drawn.picture.pixel(x, y), colormap.color(values[x as usize]));
+        assert_eq!(drawn.pixel(x, y), color(values[x as usize], 1.0));
     }
 }
 
 #[test]
 fn a_legends_bar_runs_from_low_to_high() {
-    for scale in [Scale::Sequential, Scale::Diverging] {
-        let values: Vec<f32> = (0..600).map(|i| (i as f32 - 300.0) / 300.0).collect();
-        let drawn = heatmap(&values, 600, 1, scale).draw();
-        let colormap = Colormap::new(scale, range_of(&values, scale));
-        let [low, high] = colormap.range();
-        let y = drawn.bar.y + drawn.bar.height / 2;
-        assert_eq!(drawn.picture.pixel(drawn.bar.x, y), colormap.color(low));
-        assert_eq!(drawn.picture.pixel(drawn.bar.x + drawn.bar.width - 1, y), colormap.color(high));
-        assert!(drawn.bar.y >= drawn.map.height, "the legend lies below the map");
-    }
+    let values: Vec<f32> = (0..600).map(|i| (i as f32 - 300.0) / 300.0).collect();
+    let drawn = heatmap(&values, 600, 1);
+    let is_bar = |y: u32| (1..600).filter(|&x| drawn.pixel(x, y) != drawn.pixel(x - 1, y)).count() > 250;
+    let y = (1..drawn.height).find(|&y| is_bar(y)).expect("a bar below the map");
+    let at = |value: f32| (0..600).filter(|&x| drawn.pixel(x, y) == color(value, 1.0)).collect::<Vec<_>>();
+    let [low, middle, high] = [-1.0, 0.0, 1.0].map(at);
+    assert!(low[0] < middle[0] && middle[0] < high[0], "{low:?} {middle:?} {high:?}");
+    // Zero stands in the middle, within a column.
+    assert!((middle[middle.len() / 2] as i32 - 300).abs() <= 1, "{middle:?}");
 }
 
 #[test]
 fn missing_values_have_their_own_colour_which_the_legend_names() {
     let mut values = vec![0.5_f32; 500 * 20];
     let is_missing = |pixel: &&[u8; 3]| **pixel == MISSING;
-    let whole = heatmap(&values, 500, 20, Scale::Sequential).draw();
-    assert_eq!(whole.picture.pixels.iter().filter(is_missing).count(), 0);
+    let whole = heatmap(&values, 500, 20);
+    assert_eq!(whole.pixels.iter().filter(is_missing).count(), 0);
     values[3] = f32::NAN;
     values[4] = f32::INFINITY;
-    let drawn = heatmap(&values, 500, 20, Scale::Sequential).draw();
-    assert_eq!(drawn.picture.pixel(3, 0), MISSING);
-    assert_eq!(drawn.picture.pixel(4, 0), MISSING);
-    let in_legend = drawn.picture.pixels[500 * 20..].iter().filter(is_missing).count();
+    let drawn = heatmap(&values, 500, 20);
+    assert_eq!(drawn.pixel(3, 0), MISSING);
+    assert_eq!(drawn.pixel(4, 0), MISSING);
+    let in_legend = drawn.pixels[500 * 20..].iter().filter(is_missing).count();
     assert!(in_legend >= 100, "a swatch of {in_legend} pixels");
 }
 
@@ -323,21 +322,23 @@ fn missing_values_have_their_own_colour_which_the_legend_names() {
 fn small_maps_still_get_a_legible_legend() {
     for (width, height) in [(64, 36), (1, 1), (1, 3000), (479, 2), (0, 0)] {
         let values = vec![0.25; width as usize * height as usize];
-        let drawn = heatmap(&values, width, height, Scale::Diverging).draw();
-        assert!(drawn.picture.width >= 480, "{width} × {height}");
-        assert_eq!((drawn.map.width, drawn.map.height), (width * drawn.map_scale, height * drawn.map_scale));
-        assert!(drawn.map.x + drawn.map.width <= drawn.picture.width);
-        assert!(drawn.picture.height <= (height + 82).max(1200));
+        let drawn = heatmap(&values, width, height);
+        assert!(drawn.width >= 480, "{width} × {height}");
+        let shown = drawn.pixels.iter().filter(|pixel| **pixel == color(0.25, 0.25)).count();
+        // Every value covers a square of one size.
+        let map = (drawn.height - LEGEND_HEIGHT)
+            * if height == 0 { 0 } else { (drawn.height - LEGEND_HEIGHT) / height * width };
+        assert!(shown >= map as usize, "{width} × {height}: {shown} of {map}");
+        assert!(drawn.height <= (height + LEGEND_HEIGHT).max(1200));
     }
 }
 
 #[test]
 fn ranges_are_round_and_robust() {
     let mut values = vec![0.0_f32; 10_000];
-    assert_eq!(range_of(&values, Scale::Sequential), [0.0, 1.0]);
+    assert_eq!(range_of(&values), 1.0);
     values[..2000].fill(0.4);
     values[0] = 1.0e6;
     values[1] = f32::NAN;
-    assert_eq!(range_of(&values, Scale::Sequential), [0.0, 0.4]);
-    assert_eq!(range_of(&values, Scale::Diverging), [-0.4, 0.4]);
+    assert_eq!(range_of(&values), 0.4);
 }

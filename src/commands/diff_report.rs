@@ -10,11 +10,11 @@ use crate::cli::DiffArgs;
 use crate::report::diff::mask::Mask;
 use crate::report::diff::shown::page as page_of;
 use crate::report::diff::thresholds::Thresholds;
-use crate::report::diff::words::{in_unit, margin, of_side, outcome, value};
 use crate::report::diff::{Compared, DiffReport, Request, compare, junit, markdown};
 use crate::report::header::command_line_but;
 use crate::report::page;
 use crate::report::table::{Column, Table};
+use crate::report::words::{in_unit, margin, of_side, outcome, value};
 use crate::system::output::{self, Named, check_folder, check_outputs, create_folder, write_atomically};
 
 /// Files that the folder gets besides the difference maps.

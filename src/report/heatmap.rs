@@ -1,7 +1,6 @@
-//! False-colour pictures: one value a pixel, with a legend that says what the colours mean.
+//! False-colour pictures of signed values, one a pixel, with a legend that says what the colours mean.
 
-use super::canvas::{Rect, paste};
-use super::colormap::{Colormap, Scale};
+use super::colormap::color;
 use super::legend::{self, Legend};
 use super::ticks::round_up;
 use crate::image::Picture8;
@@ -25,25 +24,13 @@ pub struct Heatmap<'a> {
     pub values: &'a [f32],
     pub width: u32,
     pub height: u32,
-    /// Low and high end, in the unit of the values: [`range_of`] finds one. Beyond it the colour is that of the end.
-    pub range: [f32; 2],
-    pub scale: Scale,
+    /// The colours go from −`range` to `range` > 0, in the unit of the values: [`range_of`] finds one.
+    pub range: f32,
     pub title: &'a str,
     /// Such as "W·m⁻²"; empty for a pure number.
     pub unit: &'a str,
     /// What the legend calls missing values, such as "no surface".
     pub missing: &'a str,
-}
-
-/// A drawn map, and where its parts lie.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct DrawnHeatmap {
-    pub picture: Picture8,
-    /// The map without its legend. Each value covers `map_scale` × `map_scale` pixels.
-    pub map: Rect,
-    pub map_scale: u32,
-    /// The legend's colour bar: low end left, high end right.
-    pub bar: Rect,
 }
 
 impl Heatmap<'_> {
@@ -52,60 +39,41 @@ impl Heatmap<'_> {
     ///
     /// # Panics
     /// When `values` does not hold `width · height` of them.
-    pub fn draw(&self) -> DrawnHeatmap {
+    pub fn draw(&self) -> Picture8 {
         assert_eq!(self.values.len(), self.width as usize * self.height as usize, "values of the map {}", self.title);
-        let colormap = Colormap::new(self.scale, self.range);
-        let map_scale = enlargement(self.width, self.height);
-        let zoom = (self.width * map_scale).div_ceil(WIDTH_PER_ZOOM).max(1);
-        let map_size = (self.width * map_scale, self.height * map_scale);
-        let width = map_size.0.max(legend::MIN_WIDTH);
-        let mut picture = Picture8::filled(width, map_size.1 + legend::HEIGHT * zoom, SURROUND);
-
-        let pixels = self.values.iter().map(|&value| colormap.color(value)).collect();
-        let colors = Picture8 { width: self.width, height: self.height, pixels };
-        let map = Rect { x: (width - map_size.0) / 2, y: 0, width: map_size.0, height: map_size.1 };
-        paste(&mut picture, &colors, map.x, map.y, map_scale);
-
-        let bar = self.legend(colormap).draw(&mut picture, map_size.1, zoom);
-        DrawnHeatmap { picture, map, map_scale, bar }
-    }
-
-    fn legend(&self, colormap: Colormap) -> Legend<'_> {
-        let [low, high] = colormap.range();
-        let finite = || self.values.iter().filter(|value| value.is_finite());
-        Legend {
-            title: self.title,
-            unit: self.unit,
-            colormap,
-            missing: self.values.iter().any(|value| !value.is_finite()).then_some(self.missing),
-            beyond: [finite().any(|&value| value < low), finite().any(|&value| value > high)],
+        let Heatmap { values, range: end, title, unit, missing, .. } = *self;
+        let scale = enlargement(self.width, self.height);
+        let (map_width, height) = (self.width * scale, self.height * scale);
+        let width = map_width.max(legend::MIN_WIDTH);
+        let mut picture = Picture8::filled(width, height, SURROUND);
+        let left = ((width - map_width) / 2) as usize;
+        for (y, row) in picture.pixels.chunks_exact_mut(width as usize).enumerate() {
+            let values = &values[y / scale as usize * self.width as usize..][..self.width as usize];
+            for (pixels, value) in row[left..].chunks_exact_mut(scale as usize).zip(values) {
+                pixels.fill(color(*value, end));
+            }
         }
+        let zoom = map_width.div_ceil(WIDTH_PER_ZOOM).max(1);
+        let legend = Legend { title, unit, end, missing, values }.draw(width, zoom);
+        picture.height += legend.height;
+        picture.pixels.extend(legend.pixels);
+        picture
     }
 }
 
-/// A range for these values: from 0 (sequential) or its negative (diverging) to the round number above 99.5 % of the magnitudes
-/// that are not 0. Without any such, 0 to 1.
-pub fn range_of(values: &[f32], scale: Scale) -> [f32; 2] {
+/// The end of a range for these values: the round number above 99.5 % of the magnitudes that are not 0; 1 without any such.
+pub fn range_of(values: &[f32]) -> f32 {
     let mut magnitudes: Vec<f32> =
         values.iter().map(|value| value.abs()).filter(|m| m.is_finite() && *m > 0.0).collect();
-    let high = if magnitudes.is_empty() {
-        1.0
-    } else {
-        let rank = (RANGE_PERCENTILE * (magnitudes.len() - 1) as f64).ceil() as usize;
-        round_up(f64::from(*magnitudes.select_nth_unstable_by(rank, f32::total_cmp).1)) as f32
-    };
-    // Rounding up may leave f32 at its very top.
-    let high = high.min(f32::MAX);
-    match scale {
-        Scale::Sequential => [0.0, high],
-        Scale::Diverging => [-high, high],
+    if magnitudes.is_empty() {
+        return 1.0;
     }
+    let rank = (RANGE_PERCENTILE * (magnitudes.len() - 1) as f64).ceil() as usize;
+    // Rounding up may leave f32 at its very top.
+    round_up(*magnitudes.select_nth_unstable_by(rank, f32::total_cmp).1).min(f32::MAX)
 }
 
 /// The whole number by which a small map is enlarged.
 fn enlargement(width: u32, height: u32) -> u32 {
-    if width == 0 || height == 0 {
-        return 1;
-    }
-    legend::MIN_WIDTH.div_ceil(width).min(MAX_ENLARGED_HEIGHT / height).max(1)
+    legend::MIN_WIDTH.div_ceil(width.max(1)).min(MAX_ENLARGED_HEIGHT / height.max(1)).max(1)
 }

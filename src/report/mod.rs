@@ -2,11 +2,11 @@
 
 pub mod bake;
 pub mod baked;
-pub mod canvas;
 pub mod colormap;
 pub mod diff;
+pub mod draw;
 pub mod error;
-pub mod font;
+pub mod gate;
 pub mod header;
 pub mod heatmap;
 pub mod leak;
@@ -19,5 +19,5 @@ pub mod reference_layers;
 pub mod render;
 pub mod sweep;
 pub mod table;
-pub mod text;
 pub mod ticks;
+pub mod words;

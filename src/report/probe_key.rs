@@ -1,19 +1,15 @@
 //! The strip below the picture of the probes that says what their colours mean.
 
-use super::canvas::{Rect, fill, paste};
-use super::text::{Anchor, TextStyle, draw_text, text_width};
-use crate::image::Picture8;
+use plotters::element::{Rectangle, Text};
 
-const BACKGROUND: [u8; 3] = [255, 255, 255];
-const INK: [u8; 3] = [28, 28, 30];
+use super::draw::{INK, fill, font, picture, units};
+use crate::image::Picture8;
 
 // px.
 const MARGIN: u32 = 10;
-const LINE: u32 = 22;
-const SWATCH: u32 = 11;
-const SWATCH_GAP: u32 = 6;
-const ENTRY_GAP: u32 = 22;
-const EM: f32 = 12.5;
+const LINE: u32 = 18;
+const SWATCH: f64 = 11.0;
+const EM: f64 = 12.5;
 
 /// One line of the key: the colour of the swatch, that of its rim, and what they mean.
 #[derive(Debug, Clone, Copy)]
@@ -23,31 +19,25 @@ pub struct Entry {
     pub meaning: &'static str,
 }
 
-/// The picture with its key below it, in as many lines as its width asks for.
-pub fn with_key(picture: &Picture8, entries: &[Entry]) -> Picture8 {
-    let width_of = |entry: &Entry| SWATCH + SWATCH_GAP + text_width(entry.meaning, EM).ceil() as u32;
-    let (mut x, mut line) = (MARGIN, 0);
-    let mut places = Vec::new();
-    for entry in entries {
-        let width = width_of(entry);
-        if x > MARGIN && x + width + MARGIN > picture.width {
-            (x, line) = (MARGIN, line + 1);
+/// The picture with its key below it, a line for each entry.
+pub fn with_key(mut picture_above: Picture8, entries: &[Entry]) -> Picture8 {
+    let height = 2 * MARGIN + entries.len() as u32 * LINE;
+    let key = picture(picture_above.width, height, |area| {
+        let left = f64::from(MARGIN);
+        for (line, entry) in entries.iter().enumerate() {
+            let top = left + (line as u32 * LINE) as f64;
+            for (inset, color) in [(0.0, entry.rim), (1.0, entry.color)] {
+                let corner = |at: f64| (units(left + at), units(top + at));
+                let corners = [corner(inset), corner(SWATCH - inset)];
+                area.draw(&Rectangle::new(corners, fill(color)))?;
+            }
+            area.draw(&Text::new(entry.meaning, (units(left + 1.6 * SWATCH), units(top)), font(EM, INK)))?;
         }
-        places.push((x, line));
-        x += width + ENTRY_GAP;
-    }
-    let height = picture.height + MARGIN + (line + 1) * LINE;
-    let mut out = Picture8::filled(picture.width, height, BACKGROUND);
-    paste(&mut out, picture, 0, 0, 1);
-    for (entry, (x, line)) in entries.iter().zip(places) {
-        let baseline = picture.height + MARGIN + line * LINE + SWATCH;
-        let swatch = Rect { x, y: baseline - SWATCH, width: SWATCH, height: SWATCH };
-        fill(&mut out, swatch, entry.rim);
-        fill(&mut out, Rect { x: x + 1, y: swatch.y + 1, width: SWATCH - 2, height: SWATCH - 2 }, entry.color);
-        let style = TextStyle { em_px: EM, color: INK };
-        draw_text(&mut out, entry.meaning, style, (x + SWATCH + SWATCH_GAP) as f32, baseline as f32, Anchor::Left);
-    }
-    out
+        Ok(())
+    });
+    picture_above.height += height;
+    picture_above.pixels.extend(key.pixels);
+    picture_above
 }
 
 #[cfg(test)]
@@ -57,11 +47,11 @@ mod tests {
     #[test]
     fn the_picture_stays_and_the_key_stands_below() {
         let entry = |meaning| Entry { color: [200, 0, 0], rim: [0; 3], meaning };
-        for (width, lines) in [(600, 1), (120, 2), (16, 2)] {
-            let picture = Picture8::filled(width, 40, [7; 3]);
-            let with = with_key(&picture, &[entry("inside geometry"), entry("never sampled")]);
-            assert_eq!((with.width, with.height), (width, 40 + MARGIN + lines * LINE));
-            assert_eq!(with.pixels[..picture.pixels.len()], picture.pixels);
+        for width in [600, 120, 16] {
+            let above = Picture8::filled(width, 40, [7; 3]);
+            let with = with_key(above.clone(), &[entry("inside geometry"), entry("never sampled")]);
+            assert_eq!((with.width, with.height), (width, 40 + 2 * MARGIN + 2 * LINE));
+            assert_eq!(with.pixels[..above.pixels.len()], above.pixels);
             assert!(with.pixels.contains(&[200, 0, 0]));
         }
     }

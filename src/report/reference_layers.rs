@@ -32,7 +32,7 @@ pub enum ReferenceError {
 
 /// What the reference says about its own noise.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Noise {
+pub struct ReferenceNoise {
     /// Variance of the pixel's mean, per channel, W²·m⁻⁴.
     pub variance: Vec<Vec3>,
     /// Between red and green, green and blue, blue and red, W²·m⁻⁴. Where it is not known the channels are taken as fully
@@ -50,14 +50,14 @@ pub struct ReferenceLayers {
     /// Indirect irradiance, W·m⁻².
     pub irradiance: Vec<Vec3>,
     /// Of the irradiance; `None` where it is not known.
-    pub noise: Option<Noise>,
+    pub noise: Option<ReferenceNoise>,
     pub beauty: Picture,
     /// Of the pixel's mean, per channel; `None` where it is not known.
     pub beauty_variance: Option<Vec<Vec3>>,
 }
 
 impl ReferenceLayers {
-    /// Takes the layers from a picture that must have this size. `blocks`: see [`Noise::blocks`].
+    /// Takes the layers from a picture that must have this size. `blocks`: see [`ReferenceNoise::blocks`].
     pub fn new(
         image: &LayeredImage,
         wanted: (u32, u32),
@@ -76,7 +76,7 @@ impl ReferenceLayers {
         if image.layer(IRRADIANCE).is_some_and(|irradiance| !irradiance.iter().any(usable)) {
             return Err(ReferenceError::NoIrradiance);
         }
-        let noise = layer(IRRADIANCE_VARIANCE).map(|variance| Noise {
+        let noise = layer(IRRADIANCE_VARIANCE).map(|variance| ReferenceNoise {
             variance,
             covariance: layer(IRRADIANCE_COVARIANCE),
             blocks,
@@ -104,7 +104,7 @@ impl ReferenceLayers {
     }
 }
 
-impl Noise {
+impl ReferenceNoise {
     /// Covariance of two channels of a pixel.
     #[inline]
     pub fn between(&self, pixel: usize, a: usize, b: usize) -> f64 {

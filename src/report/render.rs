@@ -64,7 +64,7 @@ pub struct RenderTimes {
 pub struct MethodReport {
     pub name: &'static str,
     /// Queries and shading of the whole picture, all threads, without rays.
-    pub shade_ms: Spread,
+    pub shade_ms: Timing,
     /// Rays that this method needs besides the queries: primary and shadow rays, with `visibility_ray` also those to
     /// the probes.
     pub ray_ms: f64,
@@ -83,18 +83,18 @@ pub struct MethodReport {
 }
 
 #[derive(Debug, Clone, Copy, Serialize)]
-pub struct Spread {
+pub struct Timing {
     pub min: f64,
     pub median: f64,
     pub max: f64,
     pub runs: usize,
 }
 
-impl Spread {
+impl Timing {
     /// Of at least one value.
-    pub fn of(mut values: Vec<f64>) -> Spread {
+    pub fn of(mut values: Vec<f64>) -> Timing {
         values.sort_by(f64::total_cmp);
         let at = |i: usize| values.get(i).copied().unwrap_or(f64::NAN);
-        Spread { min: at(0), median: at(values.len() / 2), max: at(values.len().saturating_sub(1)), runs: values.len() }
+        Timing { min: at(0), median: at(values.len() / 2), max: at(values.len().saturating_sub(1)), runs: values.len() }
     }
 }

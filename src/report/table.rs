@@ -3,18 +3,8 @@
 use std::fmt;
 use std::io::IsTerminal;
 
-use comfy_table::presets::NOTHING;
-use comfy_table::{
-    Cell, CellAlignment, ContentArrangement, ContentLineStyle, LineStyle, Table as Renderer, TableStyle,
-};
-
-/// Rounded corners, a line below the head, thin lines between the columns.
-const LINED: TableStyle = TableStyle::new()
-    .top_border(LineStyle::new('╭', '─', '┬', '╮'))
-    .header_lines(ContentLineStyle::new('│', '│', '│'))
-    .header_separator(LineStyle::new('├', '─', '┼', '┤'))
-    .content_lines(ContentLineStyle::new('│', '│', '│'))
-    .bottom_border(LineStyle::new('╰', '─', '┴', '╯'));
+use comfy_table::presets::{NOTHING, UTF8_FULL_CONDENSED};
+use comfy_table::{Cell, CellAlignment, ContentArrangement, Table as Renderer};
 
 /// How a column is set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,7 +41,9 @@ impl Table {
     pub fn render(&self, on_terminal: bool) -> String {
         let mut renderer = Renderer::new();
         if on_terminal {
-            renderer.load_style(LINED).set_content_arrangement(ContentArrangement::Dynamic);
+            renderer
+                .load_style(UTF8_FULL_CONDENSED.with_rounded_corners())
+                .set_content_arrangement(ContentArrangement::Dynamic);
         } else {
             renderer.load_style(NOTHING).force_no_tty();
         }

@@ -87,7 +87,7 @@ mod tests {
     use super::*;
     use crate::image::Picture;
     use crate::math::random::{Purpose, Random};
-    use crate::report::reference_layers::Noise;
+    use crate::report::reference_layers::ReferenceNoise;
 
     const PIXELS: usize = 4096;
 
@@ -96,7 +96,11 @@ mod tests {
             width: PIXELS as u32,
             height: 1,
             irradiance: vec![Vec3::splat(2.0); PIXELS],
-            noise: noise.map(|v| Noise { variance: vec![Vec3::splat(v); PIXELS], covariance: None, blocks: None }),
+            noise: noise.map(|v| ReferenceNoise {
+                variance: vec![Vec3::splat(v); PIXELS],
+                covariance: None,
+                blocks: None,
+            }),
             beauty: Picture::new(PIXELS as u32, 1),
             beauty_variance: None,
         }

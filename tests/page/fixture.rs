@@ -3,10 +3,10 @@
 use std::borrow::Cow;
 
 use glam::Vec3;
-use lightprobe::report::diff::Command;
-use lightprobe::report::diff::gate::Gate;
+use lightprobe::report::gate::{Gate, sort};
 use lightprobe::report::page::{
-    Figure, FigureTable, Histogram, PackedImage, Page, PageImage, Plot, ProbeComparison, ProbeRow, Side,
+    Command, ConfigChange, Figure, FigureTable, Histogram, PackedImage, Page, PageImage, Plot, ProbeComparison,
+    ProbeRow, Side,
 };
 
 /// Breaks out of attributes, elements, scripts and comments, and turns the text after it around.
@@ -85,20 +85,18 @@ pub fn gates() -> Vec<Gate> {
     gates.push(Gate { threshold: None, margin: None, unit: "s", ..gate("time.bake", "bake", 0.083, 1.0) });
     gates.push(Gate { value: None, margin: None, base: None, candidate: None, ..gate("image.psnr", "lit", 0.0, 1.0) });
     gates.extend((0..16).map(|i| gate("leak.dark", &format!("camera {i}"), 0.001 * f64::from(i), 0.02)));
+    sort(&mut gates);
     gates
 }
 
 /// A page of these pairs.
 pub fn page_of(images: Vec<PageImage<'static>>) -> String {
     let gates = gates();
-    let config =
-        |visibility: &str| format!("(\n    grid: (spacing_m: 1.0),\n    query: (visibility: {visibility}),\n)\n");
-    let side = |label: &str, visibility: &str| Side {
+    let side = |label: &str| Side {
         path: format!("out/{label}/{HOSTILE}"),
         kind: "render folder".to_owned(),
         seed: Some(7),
         scene_blake3: Some("4f1ab0c2".repeat(8)),
-        config: Some(config(visibility)),
     };
     let row = |i: u64| ProbeRow {
         index: 17 * i,
@@ -120,7 +118,7 @@ pub fn page_of(images: Vec<PageImage<'static>>) -> String {
     };
     let page = Page {
         title: "two_rooms_open, default against visibility off".to_owned(),
-        sides: [side("base", "moments(power: 3, floor: 0.05)"), side("candidate", "none")],
+        sides: [side("base"), side("candidate")],
         gates: &gates,
         images: images.iter().map(|image| PackedImage::new(image, images.len()).unwrap()).collect(),
         probes: vec![ProbeComparison {
@@ -156,6 +154,14 @@ pub fn page_of(images: Vec<PageImage<'static>>) -> String {
             },
             Command { purpose: "Compare".to_owned(), line: format!("lightprobe diff-report base '{HOSTILE}' -o diff") },
         ],
+        config_changes: Some(&vec![
+            ConfigChange {
+                key: "query.visibility".to_owned(),
+                base: Some("moments".to_owned()),
+                candidate: Some("none".to_owned()),
+            },
+            ConfigChange { key: HOSTILE.to_owned(), base: Some(HOSTILE.to_owned()), candidate: None },
+        ]),
         notes: vec!["Same seed and configuration of capture: noise explains nothing.".to_owned()],
     };
     lightprobe::report::page::render(page).unwrap()

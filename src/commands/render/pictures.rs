@@ -10,7 +10,6 @@ use super::reference::Reference;
 use crate::evaluate::Shaded;
 use crate::image::{LayeredImage, Picture8};
 use crate::math::color::luminance;
-use crate::report::colormap::Scale;
 use crate::report::heatmap::{Heatmap, range_of};
 use crate::report::probe_key::{Entry, with_key};
 use crate::scene::Camera;
@@ -56,7 +55,7 @@ pub fn write(
     image.write_exr(&file("leak", "exr"))?;
     leak_map(view, &off_leak, &on_leak).write_png(&file("leak", "png"))?;
     let probes = spheres::draw(&tonemapped(&exact.image), view, camera, run.volume, exposure_ev);
-    with_key(&probes, PROBE_KEY).write_png(&file("probes", "png"))?;
+    with_key(probes, PROBE_KEY).write_png(&file("probes", "png"))?;
     if let Some(reference) = reference {
         reference.write_exr(&file("reference", "exr"))?;
         reference.layers.beauty.tonemapped(exposure_ev).write_png(&file("reference", "png"))?;
@@ -81,14 +80,12 @@ fn leak_map(view: &View, off: &[Vec3], on: &[Vec3]) -> Picture8 {
         values: &values,
         width: 2 * view.width,
         height: view.height,
-        range: range_of(&values, Scale::Diverging),
-        scale: Scale::Diverging,
+        range: range_of(&values),
         title: "irradiance against exact visibility: left without, right with visibility",
         unit: "W·m⁻²",
         missing: "no surface",
     }
     .draw()
-    .picture
 }
 
 /// Signed differences from the reference, without and with visibility, under one scale so that the two compare.
@@ -105,22 +102,13 @@ fn write_errors(shaded: &[Shaded; 3], reference: &Reference, file: &dyn Fn(&str,
         ("error_on", "irradiance minus reference, with visibility", difference(on)),
     ];
     let all: Vec<f32> = maps.iter().flat_map(|(_, _, values)| values.iter().copied()).collect();
-    let range = range_of(&all, Scale::Diverging);
+    let range = range_of(&all);
     for (name, title, values) in maps {
         let mut image = LayeredImage::new(width, height);
         image.push_scalar("error", &values.iter().map(|&v| if v.is_nan() { 0.0 } else { v }).collect::<Vec<f32>>());
         image.write_exr(&file(name, "exr"))?;
-        let map = Heatmap {
-            values: &values,
-            width,
-            height,
-            range,
-            scale: Scale::Diverging,
-            title,
-            unit: "W·m⁻²",
-            missing: "no surface",
-        };
-        map.draw().picture.write_png(&file(name, "png"))?;
+        let map = Heatmap { values: &values, width, height, range, title, unit: "W·m⁻²", missing: "no surface" };
+        map.draw().write_png(&file(name, "png"))?;
     }
     Ok(())
 }

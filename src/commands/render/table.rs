@@ -2,7 +2,7 @@
 
 use crate::evaluate::PATH_RAY;
 use crate::report::baked::BakedReport;
-use crate::report::error::{ErrorReport, Measured};
+use crate::report::error::{ErrorEstimate, ErrorReport};
 use crate::report::render::{MethodReport, RenderReport};
 use crate::report::table::{Column, Table};
 use crate::system::format;
@@ -71,7 +71,7 @@ fn label(method: &MethodReport) -> &'static str {
 
 /// Root mean square error ÷ mean irradiance of the reference, with the standard error that its noise gives it. Where the reference is
 /// black, in W·m⁻².
-fn relative_rmse(measured: &Measured, mean: Option<f64>) -> String {
+fn relative_rmse(measured: &ErrorEstimate, mean: Option<f64>) -> String {
     let Some(rmse) = measured.figures.rmse else { return format::UNDEFINED.to_owned() };
     let error = measured.standard_error.rmse;
     match mean.filter(|mean| *mean > 0.0) {
@@ -81,7 +81,7 @@ fn relative_rmse(measured: &Measured, mean: Option<f64>) -> String {
 }
 
 /// Picks one region's figures.
-type Part = fn(&ErrorReport) -> &Measured;
+type Part = fn(&ErrorReport) -> &ErrorEstimate;
 
 /// What the error is relative to, each region's errors, and what speaks against relying on them.
 fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {

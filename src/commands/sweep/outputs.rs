@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 
 use crate::commands::write_json;
-use crate::report::plot::{Axis, Chart, ChartSize, Guide, Mark, Scale, Series};
+use crate::report::plot::{Chart, Guide, Mark, Series};
 use crate::report::sweep::{Aggregate, ConfigurationReport, Fronts, LadderReport, SweepReport};
 use crate::system::format;
 use crate::system::output::write_atomically;
@@ -30,90 +30,58 @@ pub fn write(report: &SweepReport, folder: &Path) -> Result<()> {
     let table = csv(report).context("cannot write the table of numbers")?;
     write_atomically(&folder.join("sweep.csv"), |file| std::io::Write::write_all(file, &table))?;
     for (name, chart) in charts(report) {
-        chart.write(&folder.join(name), ChartSize::default())?;
+        chart.write(&folder.join(name))?;
     }
     Ok(())
 }
 
-/// One line for every run.
+/// One line for every run and method.
 fn csv(report: &SweepReport) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let head = [
-        "ladder",
-        "method",
-        "label",
-        "seed",
-        "probes",
-        "probes_active",
-        "bytes",
-        "file_bytes",
-        "bake_s",
-        "survey_s",
-        "capture_s",
-        "bounces_s",
-        "filter_s",
-        "encode_s",
-        "rays_primary",
-        "rays_shadow",
-        "rays_survey",
-        "bounces",
-        "converged",
-        "visibility",
-        "shade_ms",
-        "lookup_ns",
-        "leak_light",
-        "leak_dark",
-        "leak_fraction",
-        "leak_unseen",
-        "error_relative",
-        "error_rmse",
-        "error_relmse",
-        "error_mae",
-        "error_bias",
-        "error_flip",
-    ];
-    writer.write_record(head)?;
+    let mut has_head = false;
     for configuration in &report.configurations {
         let ladder = &report.ladders[configuration.ladder];
-        for run in &configuration.runs {
-            let (t, rays) = (&run.time_s, &run.rays);
-            for m in &run.methods {
-                let number = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
-                let mut row = vec![
-                    ladder.name.clone(),
-                    ladder.method.clone(),
-                    configuration.label.clone(),
-                    run.seed.to_string(),
-                    run.probes.to_string(),
-                    run.probes_active.to_string(),
-                    run.bytes.to_string(),
-                    run.file_bytes.to_string(),
-                ];
-                row.extend([run.bake_s, t.survey, t.capture, t.bounces, t.filter, t.encode].map(|s| s.to_string()));
-                row.extend([rays.primary, rays.shadow, rays.survey].map(|n| n.to_string()));
-                row.extend([
-                    run.bounces.to_string(),
-                    run.converged.to_string(),
-                    m.name.clone(),
-                    m.shade_ms.to_string(),
-                ]);
-                let e = &m.error;
-                let numbers = [
-                    m.lookup_ns,
-                    m.leak.light,
-                    m.leak.dark,
-                    m.leak.fraction,
-                    Some(m.leak.unseen),
-                    m.error_relative,
-                    e.rmse,
-                    e.relmse,
-                    e.mae,
-                    e.bias,
-                    e.flip,
-                ];
-                row.extend(numbers.map(number));
-                writer.write_record(row)?;
+        for (run, m) in configuration.runs.iter().flat_map(|run| run.methods.iter().map(move |method| (run, method))) {
+            let (t, rays, e) = (&run.time_s, &run.rays, &m.error);
+            let number = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
+            let cells = [
+                ("ladder", ladder.name.clone()),
+                ("method", ladder.method.clone()),
+                ("label", configuration.label.clone()),
+                ("seed", run.seed.to_string()),
+                ("probes", run.probes.to_string()),
+                ("probes_active", run.probes_active.to_string()),
+                ("bytes", run.bytes.to_string()),
+                ("file_bytes", run.file_bytes.to_string()),
+                ("bake_s", run.bake_s.to_string()),
+                ("survey_s", t.survey.to_string()),
+                ("capture_s", t.capture.to_string()),
+                ("bounces_s", t.bounces.to_string()),
+                ("filter_s", t.filter.to_string()),
+                ("encode_s", t.encode.to_string()),
+                ("rays_primary", rays.primary.to_string()),
+                ("rays_shadow", rays.shadow.to_string()),
+                ("rays_survey", rays.survey.to_string()),
+                ("bounces", run.bounces.to_string()),
+                ("converged", run.converged.to_string()),
+                ("visibility", m.name.clone()),
+                ("shade_ms", m.shade_ms.to_string()),
+                ("lookup_ns", number(m.lookup_ns)),
+                ("leak_light", number(m.leak.light)),
+                ("leak_dark", number(m.leak.dark)),
+                ("leak_fraction", number(m.leak.fraction)),
+                ("leak_unseen", m.leak.unseen.to_string()),
+                ("error_relative", number(m.error_relative)),
+                ("error_rmse", number(e.rmse)),
+                ("error_relmse", number(e.relmse)),
+                ("error_mae", number(e.mae)),
+                ("error_bias", number(e.bias)),
+                ("error_flip", number(e.flip)),
+            ];
+            if !std::mem::replace(&mut has_head, true) {
+                writer.write_record(cells.each_ref().map(|(name, _)| *name))?;
             }
+            writer.write_record(cells.map(|(_, value)| value))?;
         }
     }
     Ok(writer.into_inner()?)
@@ -148,10 +116,10 @@ fn charts(report: &SweepReport) -> [(&'static str, Chart); 4] {
                 report.camera,
                 report.width,
                 report.height,
-                report.reference.spp.map_or(0, |spp| spp)
+                report.reference.spp.unwrap_or(0)
             ),
-            x: Axis::new(x.label, Scale::Log),
-            y: Axis::new(y.label, Scale::Log),
+            x_label: x.label.to_owned(),
+            y_label: y.label.to_owned(),
             series,
             guides: Vec::new(),
         }
@@ -185,8 +153,7 @@ fn series(report: &SweepReport, ladder: &LadderReport, x: &Along, y: &Along, fro
     let mark = |&i: &usize| {
         let configuration = report.configurations.get(i)?;
         let ([x, x_min, x_max], [y, y_min, y_max]) = (figure(configuration, x)?, figure(configuration, y)?);
-        let bar = |low: f64, high: f64| (high > low).then_some([low, high]);
-        Some(Mark { x, y, x_bar: bar(x_min, x_max), y_bar: bar(y_min, y_max), on_front: front.contains(&i) })
+        Some(Mark { x, y, x_bar: [x_min, x_max], y_bar: [y_min, y_max], on_front: front.contains(&i) })
     };
     Series { name: ladder.name.clone(), marks: ladder.configurations.iter().filter_map(mark).collect() }
 }
@@ -214,7 +181,7 @@ fn noise_guide(points: &[(f64, f64)], ladder: &str, series: usize) -> Option<Gui
     let high = points.iter().map(|p| p.0).fold(0.0, f64::max) * REACH;
     let at = |time: f64| (time, (offset - 0.5 * time.ln()).exp());
     let name = format!("noise of {ladder}: 1/√time");
-    Some(Guide { name, series: Some(series), from: at(low), to: at(high), dotted: true })
+    Some(Guide { name, series, ends: [at(low), at(high)], dotted: true })
 }
 
 /// Horizontal lines at what bias leaves.
@@ -225,7 +192,7 @@ fn floors(report: &SweepReport, chart: &Chart) -> Vec<Guide> {
         let (low, high) = (xs().fold(f64::INFINITY, f64::min), xs().fold(0.0, f64::max));
         let y = level * ERROR.factor;
         let name = format!("bias of {}: {}", ladder.name, format::percent(level));
-        (low < high).then_some(Guide { name, series: Some(i), from: (low, y), to: (high, y), dotted: false })
+        (low < high).then_some(Guide { name, series: i, ends: [(low, y), (high, y)], dotted: false })
     };
     report.ladders.iter().enumerate().filter_map(floor).collect()
 }
@@ -239,10 +206,10 @@ mod tests {
     fn the_guide_of_noise_goes_through_it() {
         let law = |time: f64| 3.0 / time.sqrt();
         let guide = noise_guide(&[1.0, 4.0, 16.0].map(|t| (t, law(t))), "a", 2).unwrap();
-        for (time, error) in [guide.from, guide.to] {
+        for (time, error) in guide.ends {
             assert!((error / law(time) - 1.0).abs() < 1e-12);
         }
-        assert!(guide.from.0 < 1.0 && guide.to.0 > 16.0 && guide.dotted && guide.series == Some(2));
+        assert!(guide.ends[0].0 < 1.0 && guide.ends[1].0 > 16.0 && guide.dotted && guide.series == 2);
         assert_eq!(noise_guide(&[], "a", 0), None);
     }
 }

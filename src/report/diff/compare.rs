@@ -6,19 +6,20 @@ use serde_json::json;
 
 use super::error::DiffError;
 use super::figures::{Facts, config_changes, join, side_by_side};
-use super::gate::{self, Gate};
 use super::images;
 use super::mask::Mask;
 use super::noise::{self, SIGNIFICANCE, Seeds};
 use super::pairs::{Paired, check, pair_up, pictures};
 use super::probes;
-use super::report::{Command, DiffReport, SCHEMA, SideReport, Verdict};
+use super::report::{DiffReport, SCHEMA, SideReport, Verdict};
 use super::rules::{Finding, findings};
 use super::shown::{self, Shown};
 use super::sides::{Item, Kind, Side};
 use super::sweep_plot;
 use super::thresholds::{Exception, Thresholds};
 use crate::image::Picture8;
+use crate::report::gate::{self, Gate};
+use crate::report::page::Command;
 
 /// Gates that a scene which is allowed to change does not fail by that alone.
 const OF_THE_SCENE: &[&str] = &["scene", "image.surface"];

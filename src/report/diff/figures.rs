@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 
 use crate::config::Config;
 use crate::probe::store::encode::ColorFormat;
+use crate::report::page::ConfigChange;
 
 /// Keys of a report that are not figures of the result.
 const NOT_FIGURES: [&str; 6] = ["seed", "bake_seed", "threads", "exposure_ev", "bounces", "plan"];
@@ -25,14 +26,6 @@ pub struct Figure {
     pub base: Option<f64>,
     pub candidate: Option<f64>,
     pub difference: Option<f64>,
-}
-
-/// A key of two effective configurations with different values.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ConfigChange {
-    pub key: String,
-    pub base: Option<String>,
-    pub candidate: Option<String>,
 }
 
 impl Facts {

@@ -16,7 +16,6 @@ use super::mask::Mask;
 use super::noise::Seeds;
 use crate::image::{AnyImage, ImageHeader, LayeredImage, Picture, Picture8};
 use crate::math::color::{byte_from_unit, luminance};
-use crate::report::colormap::Scale;
 use crate::report::error::flip::flip_map;
 use crate::report::heatmap::{Heatmap, range_of};
 use crate::report::page::MOST_PIXELS;
@@ -264,14 +263,12 @@ impl Layer {
             values: &values,
             width: self.base.width,
             height: self.base.height,
-            range: range_of(&values, Scale::Diverging),
-            scale: Scale::Diverging,
+            range: range_of(&values),
             title: &format!("candidate minus base {}", self.report.item),
             unit: self.quantity[1],
             missing: "not compared",
         }
         .draw()
-        .picture
     }
 }
 

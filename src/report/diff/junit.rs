@@ -2,9 +2,9 @@
 
 use quick_junit::{NonSuccessKind, Report, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
-use super::gate::Gate;
 use super::report::DiffReport;
-use super::words::{in_unit, outcome, value};
+use crate::report::gate::Gate;
+use crate::report::words::{in_unit, outcome, value};
 
 /// The whole document.
 ///

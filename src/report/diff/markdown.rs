@@ -3,9 +3,9 @@
 use minijinja::value::Serde;
 use minijinja::{Environment, Value, context};
 
-use super::gate::Gate;
 use super::report::DiffReport;
-use super::words::{in_unit, margin, of_side, outcome, value};
+use crate::report::gate::Gate;
+use crate::report::words::{in_unit, margin, of_side, outcome, value};
 use crate::system::format;
 
 const TEMPLATE: &str = include_str!("../assets/diff.md");

@@ -2,11 +2,12 @@
 
 use serde::Serialize;
 
-use super::figures::{ConfigChange, Figure};
-use super::gate::Gate;
+use super::figures::Figure;
 use super::images::ImageReport;
 use super::probes::ProbesReport;
 use super::thresholds::Thresholds;
+use crate::report::gate::Gate;
+use crate::report::page::{Command, ConfigChange};
 
 /// Version of the report's layout.
 pub const SCHEMA: &str = "lightprobe-diff/1";
@@ -32,14 +33,6 @@ pub struct Verdict {
     /// The gate that is farthest beyond its threshold.
     pub first: Option<String>,
     pub sentence: String,
-}
-
-/// A line for a shell, and what it is for.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Command {
-    /// Such as "bake, base".
-    pub purpose: String,
-    pub line: String,
 }
 
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]

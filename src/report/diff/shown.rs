@@ -60,13 +60,19 @@ pub fn page(report: &DiffReport, shown: Shown) -> Page<'_> {
         added: report.added.clone(),
         missing: report.missing.clone(),
         commands: &report.commands,
+        config_changes: report
+            .base
+            .config
+            .as_ref()
+            .and(report.candidate.config.as_ref())
+            .map(|_| &report.config_changes),
         notes: report.notes.clone(),
     }
 }
 
 fn side(side: &SideReport) -> Side {
-    let SideReport { path, kind, seed, config, scene_blake3, .. } = side.clone();
-    Side { path, kind, seed, scene_blake3, config }
+    let SideReport { path, kind, seed, scene_blake3, .. } = side.clone();
+    Side { path, kind, seed, scene_blake3 }
 }
 
 /// One pair of pictures of at most `pairs`.

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::figures::{join, number};
 use crate::report::page::Plot;
-use crate::report::plot::{Axis, Chart, ChartSize, Mark, Scale, Series};
+use crate::report::plot::{Chart, Mark, Series};
 
 /// Relative errors are drawn in percent.
 const PERCENT: f64 = 100.0;
@@ -20,12 +20,12 @@ pub(super) fn plot(item: &str, base: &Value, candidate: &Value) -> Option<Plot> 
     let chart = Chart {
         title: "Error against bake time, base and candidate".to_owned(),
         note: "bars from least to most of the seeds; filled: on the front of its ladder".to_owned(),
-        x: Axis::new("bake time (s)", Scale::Log),
-        y: Axis::new("rmse of indirect irradiance ÷ mean (%)", Scale::Log),
+        x_label: "bake time (s)".to_owned(),
+        y_label: "rmse of indirect irradiance ÷ mean (%)".to_owned(),
         series,
         guides: Vec::new(),
     };
-    Some(Plot { title, svg: chart.svg(ChartSize::default()) })
+    Some(Plot { title, svg: chart.svg() })
 }
 
 fn ladders(report: &Value, side: &str) -> Vec<Series> {
@@ -47,11 +47,11 @@ fn ladders(report: &Value, side: &str) -> Vec<Series> {
 fn mark(configuration: &Value) -> Option<Mark> {
     let along = |figure: &str, factor: f64| {
         let of = |part: &str| Some(factor * number(configuration, &format!("figures.{figure}.{part}"))?);
-        let bar = of("min").zip(of("max")).filter(|(low, high)| high > low).map(|(low, high)| [low, high]);
-        Some((of("mean")?, bar))
+        let mean = of("mean")?;
+        Some((mean, [of("min").unwrap_or(mean), of("max").unwrap_or(mean)]))
     };
     let ((x, x_bar), (y, y_bar)) = (along("bake_s", 1.0)?, along("error_relative", PERCENT)?);
-    Some(Mark { x_bar, y_bar, ..Mark::new(x, y) })
+    Some(Mark { x, y, x_bar, y_bar, on_front: false })
 }
 
 #[cfg(test)]
@@ -74,7 +74,7 @@ mod tests {
         let found = ladders(&sweep(0.02), "base");
         assert_eq!((found.len(), found[0].marks.len(), found[0].name.as_str()), (1, 2, "moments, base"));
         let mark = found[0].marks[1];
-        assert_eq!((mark.x, mark.y, mark.x_bar, mark.y_bar, mark.on_front), (4.0, 2.0, Some([4.0, 8.0]), None, true));
+        assert_eq!((mark.x, mark.y, mark.x_bar, mark.y_bar, mark.on_front), (4.0, 2.0, [4.0, 8.0], [2.0, 2.0], true));
         let plot = plot("", &sweep(0.02), &sweep(0.03)).unwrap();
         assert!(plot.svg.contains("moments, base") && plot.svg.contains("moments, candidate"));
         assert!(super::plot("", &json!({}), &json!({"configurations": []})).is_none());

@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 use wildmatch::WildMatchPattern;
 
 use super::error::DiffError;
-use super::gate::Gate;
 use super::noise::Seeds;
 use super::rules::{Finding, How};
 use crate::config::messages;
+use crate::report::gate::Gate;
 use crate::system::input::read_file;
 
 /// The defaults, and the only place where they and the names of the gates are.

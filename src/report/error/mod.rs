@@ -66,7 +66,7 @@ pub struct Figures {
 
 /// The figures of some part of the picture.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Measured {
+pub struct ErrorEstimate {
     pub pixels: usize,
     #[serde(flatten)]
     pub figures: Figures,
@@ -83,7 +83,7 @@ pub struct Measured {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ErrorReport {
     #[serde(flatten)]
-    pub all: Measured,
+    pub all: ErrorEstimate,
     pub by_region: ByRegion,
     /// ε of `relmse`, of the whole picture and its regions alike, W²·m⁻⁴.
     pub relmse_epsilon: f64,
@@ -95,8 +95,8 @@ pub struct ErrorReport {
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ByRegion {
-    pub corner: Measured,
-    pub flat: Measured,
+    pub corner: ErrorEstimate,
+    pub flat: ErrorEstimate,
 }
 
 /// Sums over the pixels of a part.
@@ -247,10 +247,16 @@ impl Sums {
         self.noise += v.iter().sum::<f64>();
     }
 
-    fn finish(&self, noise_known: bool, epsilon: f64, (peak, peak_error): (f64, f64), flip: flip::Flip) -> Measured {
+    fn finish(
+        &self,
+        noise_known: bool,
+        epsilon: f64,
+        (peak, peak_error): (f64, f64),
+        flip: flip::Flip,
+    ) -> ErrorEstimate {
         if self.pixels == 0 {
             let (figures, standard_error) = Default::default();
-            return Measured { pixels: 0, figures, standard_error, noise_rms: None, verdict: None };
+            return ErrorEstimate { pixels: 0, figures, standard_error, noise_rms: None, verdict: None };
         }
         let samples = 3.0 * self.pixels as f64;
         let square = self.square.mean(samples).max(0.0);
@@ -288,7 +294,7 @@ impl Sums {
             false => Some(NOISE_UNKNOWN),
             true => (noise > square).then_some(TOO_NOISY),
         };
-        Measured { pixels: self.pixels, figures, standard_error, noise_rms: known(noise.sqrt()), verdict }
+        ErrorEstimate { pixels: self.pixels, figures, standard_error, noise_rms: known(noise.sqrt()), verdict }
     }
 }
 

@@ -1,6 +1,6 @@
 //! A figure as a mean over pixels and channels, and what the reference's noise does to it.
 
-use crate::report::reference_layers::Noise;
+use crate::report::reference_layers::ReferenceNoise;
 
 /// Pixels × channels of a figure f(r), r being the reference with its noise: Σf, and the variance of that sum.
 ///
@@ -27,7 +27,7 @@ pub struct Terms {
 impl Pooled {
     /// Adds a pixel. `noise` is that of the reference, and the pixel's place in it.
     #[inline]
-    pub fn add(&mut self, terms: &Terms, noise: Option<(&Noise, usize)>) {
+    pub fn add(&mut self, terms: &Terms, noise: Option<(&ReferenceNoise, usize)>) {
         self.sum += terms.value.iter().sum::<f64>();
         let Some((noise, pixel)) = noise else { return };
         let square = square_share(noise.blocks);

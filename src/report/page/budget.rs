@@ -17,36 +17,30 @@ pub fn factors(finest: u32) -> impl Iterator<Item = u32> {
 /// bytes: as long as they are too large, the last pair that has its full resolution is halved, then the last of those at a half, and
 /// so on; those after the first `judged` all the way before any of the first. At last pairs are left out from the end.
 pub fn fit(mut pairs: Vec<Vec<Embedded>>, judged: usize, budget: usize) -> Vec<Option<Embedded>> {
-    let mut chosen: Vec<Option<usize>> = pairs.iter().map(|levels| (!levels.is_empty()).then_some(0)).collect();
-    let fits = |chosen: &[Option<usize>]| {
-        let sizes = pairs.iter().zip(chosen).filter_map(|(levels, level)| Some(levels[(*level)?].size_bytes()));
-        sizes.sum::<usize>() <= budget
+    // The first of a pair's resolutions is the one it has.
+    let fits = |pairs: &[Vec<Embedded>]| {
+        pairs.iter().filter_map(|levels| levels.first()).map(Embedded::size_bytes).sum::<usize>() <= budget
     };
     let halvings = |range: std::ops::Range<usize>| {
         factors(1).skip(1).flat_map(move |factor| range.clone().rev().map(move |i| (i, factor)))
     };
     let judged = judged.min(pairs.len());
     for (i, factor) in halvings(judged..pairs.len()).chain(halvings(0..judged)) {
-        if fits(&chosen) {
-            break;
-        }
-        let (levels, Some(level)) = (&pairs[i], chosen[i]) else { continue };
-        if levels[level].factor < factor && level + 1 < levels.len() {
-            chosen[i] = Some(level + 1);
+        if !fits(&pairs) && pairs[i].len() > 1 && pairs[i][0].factor < factor {
+            pairs[i].remove(0);
         }
     }
     for i in (0..pairs.len()).rev() {
-        if fits(&chosen) {
-            break;
+        if !fits(&pairs) {
+            pairs[i].clear();
         }
-        chosen[i] = None;
     }
-    pairs.iter_mut().zip(chosen).map(|(levels, level)| Some(levels.swap_remove(level?))).collect()
+    pairs.into_iter().map(|levels| levels.into_iter().next()).collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::shrink::Size;
+    use super::super::shrink::PixelExtent;
     use super::*;
 
     /// A pair of 64 kB at full resolution.
@@ -54,7 +48,7 @@ mod tests {
         let text = "x".repeat(64_000 / (factor * factor) as usize);
         Embedded {
             factor,
-            size: Size { width: 1, height: 1 },
+            size: PixelExtent { width: 1, height: 1 },
             base: text,
             candidate: String::new(),
             is_candidate_relative: false,

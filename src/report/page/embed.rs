@@ -7,22 +7,24 @@ use std::io;
 
 use glam::Vec3;
 use rayon::prelude::*;
+use serde::Serialize;
 
-use super::PageImage;
 use super::codes::{code_of_difference, code_of_display, code_of_radiance, difference_scale};
+use super::data::PageImage;
 use super::pack::{cost, pack};
-use super::shrink::{Size, mean_of_blocks, peak_of_blocks};
+use super::shrink::{PixelExtent, mean_of_blocks, peak_of_blocks};
 use crate::math::color::luminance;
 
 /// Most pixels that a browser is asked to hold of one picture: 2560 × 1440 fits.
 pub const MOST_PIXELS: usize = 1 << 22;
 
 /// A pair of pictures, packed.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Embedded {
     /// How many pixels, along each side, became one.
     pub factor: u32,
-    pub size: Size,
+    #[serde(flatten)]
+    pub size: PixelExtent,
     pub base: String,
     pub candidate: String,
     /// Whether `candidate` holds differences from `base`.
@@ -94,7 +96,7 @@ fn relative(planes: &[Vec<i16>], from: &[Vec<i16>]) -> Vec<Vec<i16>> {
 }
 
 /// The smallest power of two that leaves few enough pixels for a browser.
-pub fn finest_factor(size: Size) -> u32 {
+pub fn finest_factor(size: PixelExtent) -> u32 {
     let mut factor = 1;
     while size.shrunk(factor).pixels() > MOST_PIXELS {
         factor *= 2;
@@ -115,7 +117,7 @@ pub(super) mod tests {
 
     /// What the page's script makes of the texts: base and candidate, and the differences.
     pub fn decode(embedded: &Embedded) -> ([Vec<[i16; 3]>; 2], Vec<f64>) {
-        let Size { width, height } = embedded.size;
+        let PixelExtent { width, height } = embedded.size;
         let open = |text: &str, count| unpack(text, count, width as usize, height as usize).unwrap();
         let base = open(&embedded.base, CHANNELS);
         let mut candidate = open(&embedded.candidate, CHANNELS);
@@ -210,11 +212,11 @@ pub(super) mod tests {
 
     #[test]
     fn too_large_a_picture_is_shrunk() {
-        assert_eq!(finest_factor(Size { width: 1920, height: 1080 }), 1);
-        assert_eq!(finest_factor(Size { width: 7680, height: 4320 }), 4);
+        assert_eq!(finest_factor(PixelExtent { width: 1920, height: 1080 }), 1);
+        assert_eq!(finest_factor(PixelExtent { width: 7680, height: 4320 }), 4);
         let image = pair(9, 7);
         let embedded = Embedded::new(&image, &differences(&image), 1.0, 2).unwrap();
-        assert_eq!((embedded.factor, embedded.size), (2, Size { width: 5, height: 4 }));
+        assert_eq!((embedded.factor, embedded.size), (2, PixelExtent { width: 5, height: 4 }));
         assert_eq!(decode(&embedded).1.len(), 20);
     }
 }

@@ -5,176 +5,26 @@
 
 mod budget;
 mod codes;
+mod data;
 mod embed;
 mod histogram;
 mod images;
-mod lines;
 mod pack;
 mod shrink;
 mod still;
 mod view;
 mod visible;
 
-use std::borrow::Cow;
-use std::io;
-
-use glam::Vec3;
-use minijinja::{Environment, context};
-use thiserror::Error;
-
-use super::diff::Command;
-use super::diff::gate::Gate;
-use shrink::Size;
+use minijinja::context;
 
 pub use codes::{code_of_radiance, radiance_of_code};
+pub use data::{
+    Command, ConfigChange, Figure, FigureTable, Histogram, PageError, PageImage, Plot, ProbeComparison, ProbeRow, Side,
+};
 pub use embed::MOST_PIXELS;
 pub use images::PackedImage;
+pub use view::Page;
 
-/// What the page shows.
-#[derive(Debug)]
-pub struct Page<'a> {
-    pub title: String,
-    /// Base, candidate.
-    pub sides: [Side; 2],
-    /// In any order.
-    pub gates: &'a [Gate],
-    /// Where the page would become too large, those that are not judged lose pixels first, and of these the last ones.
-    pub images: Vec<PackedImage>,
-    /// One for each pair of probe files.
-    pub probes: Vec<ProbeComparison>,
-    pub figures: Vec<FigureTable>,
-    pub plots: Vec<Plot>,
-    /// Items that only the candidate has.
-    pub added: Vec<String>,
-    /// Items that only the base has.
-    pub missing: Vec<String>,
-    pub commands: &'a [Command],
-    pub notes: Vec<String>,
-}
-
-/// One of the two results.
-#[derive(Debug, Clone, Default)]
-pub struct Side {
-    pub path: String,
-    /// Such as "render folder".
-    pub kind: String,
-    pub seed: Option<u64>,
-    pub scene_blake3: Option<String>,
-    /// Effective configuration, RON.
-    pub config: Option<String>,
-}
-
-/// A pair of pictures of one size.
-#[derive(Debug, Clone)]
-pub struct PageImage<'a> {
-    /// Such as "lit/visibility_on".
-    pub name: String,
-    /// Such as "radiance" or "indirect irradiance".
-    pub quantity: String,
-    /// Of the pixels; empty for pure numbers.
-    pub unit: String,
-    pub width: u32,
-    pub height: u32,
-    /// Linear RGB, row 0 at the top, `width · height` of them; display-referred: sRGB codes in [0,1].
-    pub base: Cow<'a, [Vec3]>,
-    pub candidate: Cow<'a, [Vec3]>,
-    /// At which both are shown at first: the base's.
-    pub exposure_ev: f32,
-    /// A PNG: it is shown as it is, without exposure.
-    pub is_display_referred: bool,
-    /// Whether it decides.
-    pub is_judged: bool,
-    /// Which pixels are compared; `None`: all.
-    pub is_compared: Option<&'a [bool]>,
-    pub figures: Vec<Figure>,
-    /// Column, row.
-    pub worst_pixel: Option<[u32; 2]>,
-}
-
-impl PageImage<'_> {
-    fn size(&self) -> Size {
-        Size { width: self.width, height: self.height }
-    }
-}
-
-/// A figure of both sides.
-#[derive(Debug, Clone, Default)]
-pub struct Figure {
-    pub name: String,
-    pub base: Option<f64>,
-    pub candidate: Option<f64>,
-    /// Candidate against base: a difference, a ratio − 1, or a figure of the pair.
-    pub value: Option<f64>,
-    pub standard_error: Option<f64>,
-    /// "s" and "bytes" are written as times and sizes; empty for pure numbers.
-    pub unit: String,
-}
-
-/// Figures under one heading, such as those of a report.
-#[derive(Debug, Clone)]
-pub struct FigureTable {
-    pub title: String,
-    pub figures: Vec<Figure>,
-}
-
-/// Two probe files.
-#[derive(Debug, Clone)]
-pub struct ProbeComparison {
-    pub name: String,
-    pub figures: Vec<Figure>,
-    /// The worst probes, worst first.
-    pub worst: Vec<ProbeRow>,
-    pub histograms: Vec<Histogram>,
-}
-
-/// One probe of both files.
-#[derive(Debug, Clone)]
-pub struct ProbeRow {
-    pub index: u64,
-    /// World space, m.
-    pub position_m: [f64; 3],
-    /// Difference of irradiance ÷ its own, a share.
-    pub irradiance: Option<f64>,
-    /// Root mean square difference of the stored distances, m.
-    pub distance_m: Option<f64>,
-    /// "active", "inside geometry" and so on.
-    pub base_state: String,
-    pub candidate_state: String,
-    pub moved_m: Option<f64>,
-}
-
-/// Differences to count.
-#[derive(Debug, Clone)]
-pub struct Histogram {
-    pub title: String,
-    pub unit: String,
-    /// What each value belongs to, such as "probes".
-    pub what: String,
-    pub values: Vec<f32>,
-}
-
-/// A drawing, shown as a picture: whatever it holds, it cannot run or load anything.
-#[derive(Debug, Clone)]
-pub struct Plot {
-    pub title: String,
-    pub svg: String,
-}
-
-/// The page could not be made.
-#[derive(Debug, Error)]
-pub enum PageError {
-    #[error("the page of the comparison cannot show {name}: {width} × {height} pixels given as {base} and {candidate}")]
-    Size { name: String, width: u32, height: u32, base: usize, candidate: usize },
-    #[error("the page of the comparison cannot be drawn: {0}; report this")]
-    Draw(String),
-    #[error("the page of the comparison cannot be packed: {0}; report this")]
-    Pack(#[from] io::Error),
-    #[error("the page of the comparison cannot be written: {0}; report this")]
-    Template(#[from] minijinja::Error),
-}
-
-const TEMPLATE: &str = include_str!("../assets/page/page.html");
-const MACROS: &str = include_str!("../assets/page/macros.html");
 const STYLE: &str = include_str!("../assets/page/page.css");
 const START: &str = include_str!("../assets/page/start.js");
 const SCRIPTS: [&str; 3] = [
@@ -191,12 +41,9 @@ const NO_NONCE: &str = "0";
 /// # Errors
 /// None in practice: the templates are part of the program.
 pub fn render(page: Page<'_>) -> Result<String, PageError> {
-    let mut environment = Environment::new();
-    // The name's ending turns escaping on.
-    environment.add_template("macros.html", MACROS)?;
-    environment.add_template("page.html", TEMPLATE)?;
+    let environment = view::environment()?;
     let template = environment.get_template("page.html")?;
-    let view = minijinja::Value::from(minijinja::value::Serde(view::View::new(page)?));
+    let view = view::view(page);
     let with_nonce = |nonce: &str| {
         template.render(
             context! { page => view.clone(), style => STYLE, start => START, scripts => SCRIPTS, nonce => nonce },
@@ -210,21 +57,15 @@ pub fn render(page: Page<'_>) -> Result<String, PageError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::gate::Gate;
     use crate::report::page::embed::tests::pair;
 
     /// A page whose every text is `text`.
     fn page_of(text: &str) -> String {
         let text = text.to_owned();
         let figure = Figure { name: text.clone(), unit: text.clone(), value: Some(1.0), ..Figure::default() };
-        let side = Side {
-            path: text.clone(),
-            kind: text.clone(),
-            seed: Some(7),
-            scene_blake3: Some(text.clone()),
-            config: Some(text.clone()),
-        };
-        let mut other = side.clone();
-        other.config = Some(format!("{text}!"));
+        let side = Side { path: text.clone(), kind: text.clone(), seed: Some(7), scene_blake3: Some(text.clone()) };
+        let other = side.clone();
         let gates = [Gate {
             name: text.clone(),
             item: text.clone(),
@@ -272,6 +113,7 @@ mod tests {
             added: vec![text.clone()],
             missing: vec![text.clone()],
             commands: &[Command { purpose: text.clone(), line: text.clone() }],
+            config_changes: Some(&vec![ConfigChange { key: text.clone(), base: Some(text.clone()), candidate: None }]),
             notes: vec![text],
         };
         render(page).unwrap()

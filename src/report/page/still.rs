@@ -6,12 +6,12 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use glam::Vec3;
 
-use super::PageImage;
-use super::shrink::{Size, mean_of_blocks, peak_of_blocks};
+use super::data::PageImage;
+use super::shrink::{PixelExtent, mean_of_blocks, peak_of_blocks};
 use crate::image::{Picture8, tonemap};
 use crate::math::color::byte_from_unit;
-use crate::report::colormap::{Colormap, MISSING};
-use crate::report::legend::{self, Legend};
+use crate::report::colormap::color;
+use crate::report::legend::Legend;
 
 /// Marks pixels that are no light: a colour that light seldom has.
 pub const MARK: [u8; 3] = [255, 0, 255];
@@ -51,46 +51,38 @@ pub fn side(image: &PageImage<'_>, pixels: &[Vec3], width: u32) -> io::Result<St
     data_uri(image.size().shrunk(factor), mean_of_blocks(pixels, image.size(), factor).into_iter().map(color).collect())
 }
 
-/// The differences in the colours of `colormap`, as a data URI.
+/// The differences in the colours of a heat map that ends at ±`range`, as a data URI.
 ///
 /// # Errors
 /// None in practice: the writer is memory.
-pub fn heatmap(values: &[f32], size: Size, colormap: Colormap, width: u32) -> io::Result<String> {
+pub fn heatmap(values: &[f32], size: PixelExtent, range: f32, width: u32) -> io::Result<String> {
     let factor = size.width.div_ceil(width).max(1);
     let values = peak_of_blocks(values, size, factor);
-    data_uri(size.shrunk(factor), values.into_iter().map(|value| colormap.color(value)).collect())
+    data_uri(size.shrunk(factor), values.into_iter().map(|value| color(value, range)).collect())
 }
 
 /// The strip that explains the heat map's colours, as a data URI.
 ///
 /// # Errors
 /// None in practice: the writer is memory.
-pub fn legend(values: &[f32], colormap: Colormap, unit: &str) -> io::Result<String> {
-    let [low, high] = colormap.range();
-    let legend = Legend {
-        title: "candidate − base",
-        unit,
-        colormap,
-        missing: values.iter().any(|value| !value.is_finite()).then_some("not compared"),
-        beyond: [values.iter().any(|&value| value < low), values.iter().any(|&value| value > high)],
-    };
-    let mut picture = Picture8::filled(LEGEND_WIDTH * LEGEND_ZOOM, legend::HEIGHT * LEGEND_ZOOM, MISSING);
-    legend.draw(&mut picture, 0, LEGEND_ZOOM);
-    let mut bytes = Vec::new();
-    picture.encode_png(&mut bytes)?;
-    Ok(format!("data:image/png;base64,{}", STANDARD.encode(bytes)))
+pub fn legend(values: &[f32], range: f32, unit: &str) -> io::Result<String> {
+    let legend = Legend { title: "candidate − base", unit, end: range, missing: "not compared", values };
+    png_uri(&legend.draw(LEGEND_WIDTH * LEGEND_ZOOM, LEGEND_ZOOM))
 }
 
 /// A picture as a data URI: as JPEG, unless it is so small that single pixels are seen.
-fn data_uri(size: Size, pixels: Vec<[u8; 3]>) -> io::Result<String> {
+fn data_uri(size: PixelExtent, pixels: Vec<[u8; 3]>) -> io::Result<String> {
     let picture = Picture8 { width: size.width, height: size.height, pixels };
+    if size.pixels() <= MOST_PNG_PIXELS {
+        return png_uri(&picture);
+    }
     let mut bytes = Vec::new();
-    let kind = if size.pixels() <= MOST_PNG_PIXELS {
-        picture.encode_png(&mut bytes)?;
-        "png"
-    } else {
-        picture.encode_jpeg(&mut bytes)?;
-        "jpeg"
-    };
-    Ok(format!("data:image/{kind};base64,{}", STANDARD.encode(bytes)))
+    picture.encode_jpeg(&mut bytes)?;
+    Ok(format!("data:image/jpeg;base64,{}", STANDARD.encode(bytes)))
+}
+
+fn png_uri(picture: &Picture8) -> io::Result<String> {
+    let mut bytes = Vec::new();
+    picture.encode_png(&mut bytes)?;
+    Ok(format!("data:image/png;base64,{}", STANDARD.encode(bytes)))
 }

@@ -5,10 +5,10 @@ use std::path::Path;
 use serde_json::json;
 
 use super::error::DiffError;
-use super::figures::{Facts, config_changes, join, side_by_side};
+use super::figures::{Facts, Seeds, config_changes, join, side_by_side};
 use super::images;
 use super::mask::Mask;
-use super::noise::{self, SIGNIFICANCE, Seeds};
+use super::noise::{self, SIGNIFICANCE};
 use super::pairs::{Paired, check, pair_up, pictures};
 use super::probes;
 use super::report::{DiffReport, SCHEMA, SideReport, Verdict};

@@ -95,6 +95,36 @@ impl Facts {
     }
 }
 
+/// What the random numbers of both sides have to do with each other.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Seeds {
+    /// Nothing tells, as of pictures alone. They are taken for equal.
+    #[default]
+    Unknown,
+    Equal,
+    Other,
+}
+
+impl Seeds {
+    /// All seeds that went into both sides count: a render's own is that of its lamps' samples, its probes have that of their bake.
+    pub fn of(sides: [&Facts; 2]) -> Seeds {
+        let is_render = sides.iter().any(|side| side.text("command") == Some("render"));
+        let is_sweep = sides.iter().all(|side| side.get("seeds").is_some());
+        let keys: &[&str] = match (is_render, is_sweep) {
+            (true, _) => &["seed", "bake_seed"],
+            (_, true) => &["seeds"],
+            _ => &["seed"],
+        };
+        let equal = |key: &&str| sides[0].get(key).zip(sides[1].get(key)).map(|(base, candidate)| base == candidate);
+        let equal: Vec<Option<bool>> = keys.iter().map(equal).collect();
+        match equal {
+            _ if equal.contains(&Some(false)) => Seeds::Other,
+            _ if equal.contains(&None) => Seeds::Unknown,
+            _ => Seeds::Equal,
+        }
+    }
+}
+
 /// A number at a place such as "figures.leak_light.mean".
 pub fn number(value: &Value, place: &str) -> Option<f64> {
     place.split('.').try_fold(value, |value, key| value.get(key))?.as_f64()
@@ -173,5 +203,22 @@ mod tests {
             names,
             ["configurations.x.y=1.converged", "configurations.x.y=1.seeds", "energy", "methods.a.leak.light"]
         );
+    }
+
+    #[test]
+    fn every_seed_of_a_side_counts() {
+        let render = |seed: u64, bake: Value| json!({"command": "render", "seed": seed, "bake_seed": bake});
+        for (a, b, expected) in [
+            (render(0, json!(1)), render(0, json!(1)), Seeds::Equal),
+            (render(0, json!(1)), render(0, json!(2)), Seeds::Other),
+            (render(0, json!(1)), render(3, json!(1)), Seeds::Other),
+            (render(0, json!(null)), render(0, json!(1)), Seeds::Unknown),
+            (json!({"command": "bake", "seed": 4}), json!({"command": "bake", "seed": 4}), Seeds::Equal),
+            (json!({"seed": 0, "seeds": [0, 1]}), json!({"seed": 0, "seeds": [0, 1]}), Seeds::Equal),
+            (json!({"seed": 0, "seeds": [0, 1]}), json!({"seed": 0, "seeds": [0, 1, 2]}), Seeds::Other),
+            (json!({}), json!({}), Seeds::Unknown),
+        ] {
+            assert_eq!(Seeds::of([&Facts::of(&a), &Facts::of(&b)]), expected, "{a} {b}");
+        }
     }
 }

@@ -11,9 +11,8 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::error::DiffError;
-use super::figures::join;
+use super::figures::{Seeds, join};
 use super::mask::Mask;
-use super::noise::Seeds;
 use crate::image::{AnyImage, ImageHeader, LayeredImage, Picture, Picture8};
 use crate::math::color::{byte_from_unit, luminance};
 use crate::report::error::flip::flip_map;

@@ -1,10 +1,9 @@
 //! What of the two sides belongs together, and whether it can be compared.
 
 use super::error::DiffError;
-use super::figures::join;
+use super::figures::{Seeds, join};
 use super::images::{self, Pair};
 use super::mask::Mask;
-use super::noise::Seeds;
 use super::sides::{Item, Kind, Side};
 
 /// Pictures of `render` that are compared, with whether they decide.

@@ -5,8 +5,7 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use super::figures::{Facts, join};
-use super::noise::Seeds;
+use super::figures::{Facts, Seeds, join};
 use crate::system::format;
 
 static RULES: LazyLock<Vec<Rule>> = LazyLock::new(|| {

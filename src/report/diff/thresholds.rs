@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use wildmatch::WildMatchPattern;
 
 use super::error::DiffError;
-use super::noise::Seeds;
+use super::figures::Seeds;
 use super::rules::{Finding, How};
 use crate::config::messages;
 use crate::report::gate::Gate;
@@ -85,7 +85,7 @@ impl Thresholds {
     fn put(&mut self, text: &str, place: &str) -> Result<(), DiffError> {
         let file = parse(text, place)?;
         let known: Vec<String> = self.gates.keys().cloned().collect();
-        let named = |pattern: &str, limit: &Limit| {
+        let check = |pattern: &str, limit: &Limit, fits: fn(&str, &str) -> bool| {
             let bounds = [limit.absolute, limit.relative, limit.standard_errors, limit.other_seeds];
             let what = if !known.iter().any(|name| fits(pattern, name)) {
                 messages::unknown_key(pattern, known.iter().map(String::as_str))
@@ -97,11 +97,11 @@ impl Thresholds {
             Err(DiffError::file(Path::new(place), what))
         };
         for (name, limit) in file.gates {
-            named(&name, &limit)?;
+            check(&name, &limit, |name, known| name == known)?;
             self.sources.insert(name.clone(), format!("{place}: gates.{name}"));
             self.gates.insert(name, limit);
         }
-        file.exceptions.iter().try_for_each(|exception| named(&exception.gate, &exception.limit))?;
+        file.exceptions.iter().try_for_each(|exception| check(&exception.gate, &exception.limit, fits))?;
         self.exceptions.extend(file.exceptions);
         self.file = Some(place.to_owned());
         Ok(())
@@ -292,6 +292,7 @@ mod tests {
             (r#"(gates: {"leak.ligth": (absolute: 1)})"#, "did you mean 'leak.light'"),
             (r#"(gates: {"leak.light": (absolut: 1)})"#, "did you mean 'absolute'"),
             (r#"(gate: {})"#, "did you mean 'gates'"),
+            (r#"(gates: {"leak.*": ()})"#, "there is no key 'leak.*'"),
             (r#"(gates: {"leak.light": (absolute: -1)})"#, "from 0 up"),
             (r#"(exceptions: [(item: "*", gate: "lek.*", limit: ())])"#, "there is no key 'lek.*'"),
             ("", "it is empty"),

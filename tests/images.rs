@@ -326,9 +326,9 @@ fn small_maps_still_get_a_legible_legend() {
         assert!(drawn.width >= 480, "{width} × {height}");
         let shown = drawn.pixels.iter().filter(|pixel| **pixel == color(0.25, 0.25)).count();
         // Every value covers a square of one size.
-        let map = (drawn.height - LEGEND_HEIGHT)
-            * if height == 0 { 0 } else { (drawn.height - LEGEND_HEIGHT) / height * width };
-        assert!(shown >= map as usize, "{width} × {height}: {shown} of {map}");
+        let scale = (drawn.height - LEGEND_HEIGHT).checked_div(height).unwrap_or(1);
+        let map = (width * height * scale * scale) as usize;
+        assert!(shown >= map, "{width} × {height}: {shown} of {map}");
         assert!(drawn.height <= (height + LEGEND_HEIGHT).max(1200));
     }
 }

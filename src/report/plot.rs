@@ -50,6 +50,9 @@ const PADDING: f64 = 0.05;
 /// Ranges are widened by at least this factor: tiny differences should look tiny.
 const LEAST_FACTOR: f64 = 1.1;
 
+/// In units of a drawing.
+type Point = (i32, i32);
+
 /// One mark and the bars around it; axes have no place for what is not positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mark {
@@ -214,7 +217,7 @@ fn range(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
 }
 
 /// Area and outline of a series' mark; a hollow one is not on the front.
-fn mark(at: (i32, i32), series: usize, filled: bool) -> (Polygon<(i32, i32)>, PathElement<(i32, i32)>) {
+fn mark(at: Point, series: usize, filled: bool) -> (Polygon<Point>, PathElement<Point>) {
     let (corners, turn, reach) = SHAPES[series % SHAPES.len()];
     let corner = |i: u32| (TAU * (f64::from(i) / f64::from(corners) + turn)).sin_cos();
     let corners: Vec<_> =

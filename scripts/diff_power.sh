@@ -6,9 +6,9 @@ source "$(dirname -- "${BASH_SOURCE[0]}")/lib.sh"
 
 only_help "usage: scripts/diff_power.sh
 
-Bakes and renders scenes at a spacing each, fine and far too coarse, with the seeds 0 to 20. Compares neighbours: twenty pairs that
-differ in their seed only. Then bakes with the lamps some percent brighter, and looks for the least change that is caught in 19 of
-20 pairs: with another seed on each side, and with the same. RUNS='cornell:0.25 office:1' chooses scenes and spacings (m).
+Bakes and renders scenes at a spacing each, fine and far too coarse, with the seeds 0 to 20. Compares twenty candidates with a base that
+differs in its seed only: one other seed, and eight others side by side. Then bakes with the lamps some percent brighter, and looks for
+the least change that is caught in 19 of 20: with one other seed, with eight, and with the same. RUNS='cornell:0.25 office:1' chooses scenes and spacings (m).
 LIGHTPROBE names a binary to use instead of building one." "$@"
 
 provide_lightprobe
@@ -16,13 +16,14 @@ mkdir -p out/power
 
 python3 - "$lightprobe" out/power "${RUNS:-cornell:0.25 two_rooms_open:0.5 two_rooms_open:1 two_rooms_open:2 courtyard:2 office:2}" <<'PYTHON'
 import json
+import shutil
 import struct
 import subprocess
 import sys
 from pathlib import Path
 
 program, folder, runs = sys.argv[1], Path(sys.argv[2]), sys.argv[3].split()
-PAIRS, NEEDED = 20, 19
+PAIRS, NEEDED, SEEDS = 20, 19, 8
 PERCENTS = [0.3, 0.5, 0.75, 1, 1.5, 2, 3, 4, 6]
 
 
@@ -67,14 +68,29 @@ def failing(a, b):
     return [g["name"] for g in json.loads(run.stdout)["gates"] if not g["passed"] and not g["waived"]]
 
 
+def several(sides, candidate):
+    """A base of the eight seeds after the candidate's."""
+    base = folder / "several"
+    shutil.rmtree(base, ignore_errors=True)
+    base.mkdir()
+    for step in range(1, SEEDS + 1):
+        (base / str(step)).symlink_to(sides[(candidate + step) % len(sides)].resolve())
+    return base
+
+
 for run in runs:
     scene, spacing = run.split(":")
     sides = [make(scene, spacing, 0, seed) for seed in range(PAIRS + 1)]
-    found = [failing(sides[i], sides[i + 1]) for i in range(PAIRS)]
-    print(f"{scene} {spacing} m: {sum(map(bool, found))} of {PAIRS} pairs of seeds fail {[f for f in found if f]}", flush=True)
-    for what, other in [("other seeds", 1), ("equal seeds", 0)]:
+    bases = {
+        "one other seed": lambda i: sides[i + 1],
+        f"{SEEDS} other seeds": lambda i: several(sides, i),
+        "equal seeds": lambda i: sides[i],
+    }
+    for what, base in bases.items():
+        found = [failing(base(i), sides[i]) for i in range(PAIRS)]
+        print(f"{scene} {spacing} m, {what}: {sum(map(bool, found))} of {PAIRS} fail {[f for f in found if f]}", flush=True)
         for percent in PERCENTS:
-            caught = sum(bool(failing(sides[i], make(scene, spacing, percent, i + other))) for i in range(PAIRS))
+            caught = sum(bool(failing(base(i), make(scene, spacing, percent, i))) for i in range(PAIRS))
             print(f"  {what}: {percent} % brighter is caught in {caught} of {PAIRS}", flush=True)
             if caught >= NEEDED:
                 break

@@ -14,7 +14,7 @@ use crate::report::diff::{Compared, DiffReport, Request, compare, junit, markdow
 use crate::report::header::command_line_but;
 use crate::report::page;
 use crate::report::table::{Column, Table};
-use crate::report::words::{in_unit, margin, of_side, outcome};
+use crate::report::words::{in_unit, margin, of_side, outcome, value};
 use crate::system::output::{self, Named, check_folder, check_outputs, create_folder, write_atomically};
 
 /// Files that the folder gets besides the difference maps.
@@ -87,7 +87,7 @@ fn write(args: &DiffArgs, compared: &mut Compared) -> Result<()> {
     let shown = std::mem::take(&mut compared.shown);
     let report = &compared.report;
     // All texts are made before the first file is written.
-    let markdown = markdown::text(report);
+    let markdown = markdown::text(report)?;
     let junit = junit::text(report).context("cannot write the gates as JUnit XML")?;
     let page = page::render(page_of(report, shown))?;
     create_folder(&args.output)?;
@@ -127,7 +127,7 @@ fn print(args: &DiffArgs, console: &Console, report: &DiffReport) -> Result<()> 
             gate.item.clone(),
             of_side(gate.base, gate.unit),
             of_side(gate.candidate, gate.unit),
-            in_unit(gate.value, gate.unit),
+            value(gate),
             in_unit(gate.threshold, gate.unit),
             margin(gate),
             gate.source.clone(),

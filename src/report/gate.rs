@@ -1,4 +1,4 @@
-//! Judged figures of a comparison, as its report and its page have them.
+//! One judged figure, and the order of all of them.
 
 use serde::Serialize;
 
@@ -48,13 +48,14 @@ impl Gate {
     }
 }
 
-/// The worst first: what fails, by how far; then what comes closest; last what is only shown.
+/// The worst first: what fails, by how far; then what comes closest; last what is only shown. Another scene comes before all else: it
+/// explains the rest.
 pub fn sort(gates: &mut [Gate]) {
     let rank = |gate: &Gate| match gate {
-        _ if gate.fails() => 0,
-        _ if gate.waived => 1,
-        _ if gate.is_judged() => 2,
-        _ => 3,
+        _ if gate.fails() => u8::from(gate.name != "scene"),
+        _ if gate.waived => 2,
+        _ if gate.is_judged() => 3,
+        _ => 4,
     };
     // Without a margin a gate is undefined: first where it fails by that, last where there was nothing to judge.
     let undefined = |gate: &Gate| if gate.fails() { f64::NEG_INFINITY } else { f64::INFINITY };
@@ -63,4 +64,39 @@ pub fn sort(gates: &mut [Gate]) {
         let by_name = || (&a.name, &a.item).cmp(&(&b.name, &b.item));
         rank(a).cmp(&rank(b)).then(margin(a).total_cmp(&margin(b))).then_with(by_name)
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_worst_comes_first() {
+        let gate = |name: &str, passed: bool, margin: Option<f64>| Gate {
+            name: name.to_owned(),
+            item: String::new(),
+            base: None,
+            candidate: None,
+            value: None,
+            unit: "",
+            threshold: Some(1.0),
+            margin,
+            standard_error: None,
+            passed,
+            waived: false,
+            source: String::new(),
+            explanation: String::new(),
+        };
+        let mut gates = vec![
+            gate("nothing to judge", true, None),
+            gate("untouched", true, Some(1.0)),
+            gate("close", true, Some(0.1)),
+            gate("beyond", false, Some(-3.0)),
+            gate("undefined on one side", false, None),
+            gate("scene", false, Some(-1.0)),
+        ];
+        sort(&mut gates);
+        let names: Vec<&str> = gates.iter().map(|gate| gate.name.as_str()).collect();
+        assert_eq!(names, ["scene", "undefined on one side", "beyond", "close", "untouched", "nothing to judge"]);
+    }
 }

@@ -33,17 +33,20 @@ pub fn outcome(gate: &Gate) -> &'static str {
     }
 }
 
-/// The margin, as a share.
+/// The judged figure with its unit. A change from 0 is no number.
+pub fn value(gate: &Gate) -> String {
+    match (gate.value, gate.base, gate.candidate) {
+        (None, Some(0.0), Some(_)) => "from 0".to_owned(),
+        (value, ..) => in_unit(value, gate.unit),
+    }
+}
+
+/// The margin as a share; beyond the threshold how many times that is the figure.
 pub fn margin(gate: &Gate) -> String {
     match (gate.margin, gate.threshold) {
         // Nothing was allowed: a share of nothing says nothing.
-        (Some(margin), Some(0.0)) => {
-            if margin < 0.0 {
-                "beyond".to_owned()
-            } else {
-                format::percent(1.0)
-            }
-        }
+        (Some(margin), Some(0.0)) if margin < 0.0 => "beyond".to_owned(),
+        (Some(margin), _) if margin < 0.0 => format!("{} ×", format::significant(1.0 - margin, 3)),
         (margin, _) => format::or_undefined(margin, format::percent),
     }
 }
@@ -51,8 +54,6 @@ pub fn margin(gate: &Gate) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::diff::gate::{Direction, Finding};
-    use crate::report::diff::thresholds::Thresholds;
 
     #[test]
     fn bytes_are_sizes() {
@@ -63,16 +64,28 @@ mod tests {
     }
 
     #[test]
-    fn a_gate_at_zero_shows_no_share() {
-        let thresholds = Thresholds::load(None).unwrap();
-        let gate = thresholds.judge(Finding::difference(
-            "image.non_finite",
-            "",
-            [Some(0.0), Some(1.0)],
-            "",
-            Direction::Increase,
-            "",
-        ));
-        assert!(gate.fails() && margin(&gate) == "beyond" && outcome(&gate) == "FAIL");
+    fn margins_are_shares_and_multiples() {
+        let gate = |base, value, threshold, margin| Gate {
+            name: String::new(),
+            item: String::new(),
+            base: Some(base),
+            candidate: Some(1.0),
+            value,
+            unit: "%",
+            threshold: Some(threshold),
+            margin,
+            standard_error: None,
+            passed: false,
+            waived: false,
+            source: String::new(),
+            explanation: String::new(),
+        };
+        assert_eq!(margin(&gate(1.0, Some(1.0), 0.0, Some(-2.0))), "beyond");
+        assert_eq!(margin(&gate(1.0, Some(1.0), 2.0, Some(0.5))), "50.0 %");
+        assert_eq!(margin(&gate(1.0, Some(232.0), 1.0, Some(-231.0))), "232 ×");
+        assert_eq!(
+            (value(&gate(0.0, None, 1.0, None)), value(&gate(1.0, None, 1.0, None))),
+            ("from 0".into(), "–".into())
+        );
     }
 }

@@ -1,7 +1,7 @@
 //! Faults put in on purpose: each must be found, by exit code 1 and the gate that is about it; the same without the fault
 //! must pass.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use glam::Vec3;
@@ -188,34 +188,67 @@ fn scene_fault(folder: &Folder, base: &Made, fault: &Made, [pictures, probes]: [
         caught(folder, a, b, &["--allow-scene-change"], light);
         let (_, found) = report(&diff(folder, a, b, &["--allow-scene-change"]));
         assert!(!failing(&found).contains(&"scene".to_owned()));
+        let (_, strict) = report(&diff(folder, a, b, &[]));
+        assert_eq!(strict["gates"][0]["name"], "scene", "it explains the rest");
         let waived = found["gates"].as_array().unwrap().iter().find(|g| g["name"] == "scene").unwrap();
         assert_eq!((&waived["waived"], &waived["source"]), (&json!(true), &json!("--allow-scene-change")));
     }
 }
 
+/// 512 probes, of which most are active.
+const OF_512: &str = "--set grid.divisions=(8,8,8) --set encoding.irradiance=f32";
+
+/// A copy of a file of [`OF_512`] in which one probe is four times as bright, and that probe.
+fn with_bright_probe(folder: &Folder, made: &Made) -> (PathBuf, usize) {
+    let mut container = Container::read(&made.probes).unwrap();
+    let map = container.tensors["irradiance"].bytes.len() / 512;
+    let states = container.tensors["state"].bytes.clone();
+    let probe = (200..512).find(|&p| states[p] == 0).unwrap();
+    let bytes = &mut container.tensors.get_mut("irradiance").unwrap().bytes[probe * map..(probe + 1) * map];
+    for number in bytes.as_chunks_mut::<4>().0 {
+        *number = (4.0 * f32::from_le_bytes(*number)).to_le_bytes();
+    }
+    let path = folder.path().join("corrupt.probes");
+    container.write(&path).unwrap();
+    (path, probe)
+}
+
 #[test]
 fn one_probe_of_five_hundred() {
     let folder = Folder::new();
-    // 512 probes, of which most are active.
-    let words = "--set grid.divisions=(8,8,8) --set encoding.irradiance=f32";
-    let base = make(&folder, "base", &scene("cornell"), words);
-    let other_seed = make(&folder, "other", &scene("cornell"), &format!("{words} --seed 5"));
-    passes(&folder, &base.probes, &other_seed.probes, &[]);
-    for (made, name) in [(&base, "same"), (&other_seed, "seed")] {
-        let mut container = Container::read(&made.probes).unwrap();
-        let map = container.tensors["irradiance"].bytes.len() / 512;
-        let states = container.tensors["state"].bytes.clone();
-        let probe = (200..512).find(|&p| states[p] == 0).unwrap();
-        let bytes = &mut container.tensors.get_mut("irradiance").unwrap().bytes[probe * map..(probe + 1) * map];
-        for number in bytes.as_chunks_mut::<4>().0 {
-            *number = (4.0 * f32::from_le_bytes(*number)).to_le_bytes();
-        }
-        let path = folder.path().join(format!("{name}.corrupt.probes"));
-        container.write(&path).unwrap();
-        caught(&folder, &base.probes, &path, &[], "probes.worst");
-        let (_, found) = report(&diff(&folder, &base.probes, &path, &[]));
-        assert_eq!(found["probes"][0]["worst"][0]["index"], probe, "{}", found["probes"][0]["worst"]);
+    let base = make(&folder, "base", &scene("cornell"), OF_512);
+    let (path, probe) = with_bright_probe(&folder, &base);
+    caught(&folder, &base.probes, &path, &[], "probes.worst");
+    let (_, found) = report(&diff(&folder, &base.probes, &path, &[]));
+    assert_eq!(found["probes"][0]["worst"][0]["index"], probe, "{}", found["probes"][0]["worst"]);
+}
+
+#[test]
+fn one_probe_of_five_hundred_in_spite_of_noise() {
+    let folder = Folder::new();
+    let seeds = folder.path().join("seeds");
+    std::fs::create_dir(&seeds).unwrap();
+    let bake = |seed: u32| make(&folder, &format!("s{seed}"), &scene("cornell"), &format!("{OF_512} --seed {seed}"));
+    for seed in 0..8 {
+        std::fs::copy(bake(seed).probes, seeds.join(format!("{seed}.probes"))).unwrap();
     }
+    let other = bake(20);
+    passes(&folder, &seeds, &other.probes, &[]);
+    let (_, found) = report(&diff(&folder, &seeds, &other.probes, &[]));
+    assert!(found["notes"].to_string().contains("The base has 8 seeds"), "{}", found["notes"]);
+    // Less than where the base has one seed only.
+    let mean = found["gates"].as_array().unwrap().iter().find(|g| g["name"] == "irradiance.mean").unwrap();
+    assert!(mean["threshold"].as_f64().unwrap() < 10.0, "{mean}");
+    let (path, _) = with_bright_probe(&folder, &other);
+    caught(&folder, &seeds, &path, &[], "probes.worst");
+    // The noise of an equal seed is no noise: the bounds are narrow.
+    let (_, found) = report(&diff(&folder, &seeds, &seeds.join("3.probes"), &[]));
+    let mean = found["gates"].as_array().unwrap().iter().find(|g| g["name"] == "irradiance.mean").unwrap();
+    assert_eq!((&mean["value"], &mean["threshold"]), (&json!(0.0), &json!(0.2)));
+    // Two of one seed tell of no noise.
+    std::fs::copy(seeds.join("3.probes"), seeds.join("again.probes")).unwrap();
+    let message = crate::program::one_error(&diff(&folder, &seeds, &other.probes, &[]));
+    assert!(message.contains("one seed") && message.contains("again.probes"), "{message}");
 }
 
 #[test]

@@ -92,8 +92,8 @@ fn more_memory_than_there_is() {
     // 3 GiB: the program takes a few hundred MiB of address space.
     let limited = |arguments: &[&str]| in_memory(3 << 20, &[arguments, &["--threads", "1"]].concat());
     for (set, word) in [
-        ("filter.irradiance_resolution=1024", "filter.irradiance_resolution"),
-        ("capture.resolution=1024", "capture.resolution"),
+        ("filter.irradiance_resolution=1024", "store.irradiance.octahedral.resolution"),
+        ("capture.rays.octahedral.resolution=1024", "capture.rays.octahedral.resolution"),
         ("grid.divisions=(400,400,400)", "grid.divisions"),
         ("grid.spacing_m=0.02", "grid.spacing_m"),
     ] {
@@ -134,10 +134,10 @@ fn grids_that_no_one_means() {
         assert!(message.contains("--set grid.spacing_m=") && message.contains("positive"), "{message}");
         let config = file(&format!("(grid: (spacing_m: {value}))"));
         let message = bake(&["--config", text(&config)]);
-        assert!(message.contains("config.ron: grid.spacing_m") && message.contains("positive"), "{message}");
+        assert!(message.contains("config.ron, line 1: grid.spacing_m") && message.contains("positive"), "{message}");
     }
     let config = file("(grid: (bounds: (min: (0, NaN, 0), max: (1, 1, 1))))");
-    assert!(bake(&["--config", text(&config)]).contains("config.ron: grid.bounds"));
+    assert!(bake(&["--config", text(&config)]).contains("config.ron, line 1: grid.bounds"));
     let message = bake(&["--set", "grid.divisions=(4000000000,4000000000,4000000000)"]);
     assert!(message.contains("6e28 probes"), "{message}");
     let config = file("(grid: (spacing_m: 1))");
@@ -272,7 +272,7 @@ fn verbose_runs_tell_what_they_do() {
     for line in ["scene: ", "probes: ", "camera front: ", "visibility_on: ", "wrote "] {
         assert!(rendered.stderr.lines().any(|l| l.starts_with(line)), "no '{line}' in {}", rendered.stderr);
     }
-    let traced = succeed(&[&arguments[..], &["--reference", "16"]].concat());
+    let traced = succeed(&[&arguments[..], &["--reference", "16", "--bake-error"]].concat());
     for line in ["probes by full paths: ", "reference: 16 samples per pixel"] {
         assert!(traced.stderr.lines().any(|l| l.starts_with(line)), "no '{line}' in {}", traced.stderr);
     }

@@ -59,7 +59,7 @@ fn configuration_files() {
     bad_bake(&furnace, &["--config", "/nowhere/at/all.ron"], &["/nowhere/at/all.ron"]);
     let good = folder.write("good.ron", "(grid: (spacing_m: 0.9))");
     let baked = bake(&folder, &furnace, &format!("--config {}", text(&good)));
-    assert!(baked.report["config"].as_str().unwrap().contains("spacing_m: Some(0.9)"));
+    assert!(baked.report["config"].as_str().unwrap().contains("spacing_m: 0.9"));
 }
 
 #[test]
@@ -89,7 +89,6 @@ fn arguments_that_do_not_parse() {
         (&["bake", text(&furnace), "-o", text(&output), "--env", "sky.png"], "sky.png"),
         (&["bake", text(&furnace), "-o", text(&output), "--seed", "x"], "--seed"),
         (&["bake", text(&furnace), "-o", text(&output), "--memory-budget", "lots"], "512MiB"),
-        (&["bake", text(&furnace), "-o", text(&output), "--config", "a", "--preset", "default"], "--preset"),
         (&["bake", text(&furnace), "-o", text(&output), "--wrong"], "--wrong"),
         (&["render", text(&furnace), "p", "-o", text(&output), "--size", "0x5"], "640x360"),
         (&["render", text(&furnace), "p", "-o", text(&output), "--size", "99999x5"], "16384"),
@@ -167,7 +166,7 @@ fn presets_and_configurations_are_printed_and_read_back() {
     );
     let set = ["bake", "--print-config", "--set", "grid.spacing_m=0.125", "--set", "grid.padding=0.5"];
     let printed = succeed(&set).stdout;
-    assert!(printed.contains("spacing_m: Some(0.125)") && printed.contains("padding: 0.5"), "{printed}");
+    assert!(printed.contains("spacing_m: 0.125") && printed.contains("padding: 0.5"), "{printed}");
 }
 
 #[test]

@@ -141,7 +141,8 @@ fn a_number_of_bounces_is_that_of_the_reference() {
     for bounces in 0..4 {
         let sum: f64 = (0..=bounces).map(|k| albedo.powi(k)).sum();
         for emission in ["sampled", "gathered"] {
-            let words = format!("{INSIDE} --set transport.bounces.max_bounces={bounces} --set capture.emission={emission}");
+            let words =
+                format!("{INSIDE} --set transport.bounces.max_bounces={bounces} --set capture.emission={emission}");
             let files = seeds(&folder, &scene, &words, 2);
             check_means(&files, &files[0].active(), [PI * sum; 3], &format!("{bounces} bounces, {emission}"));
         }

@@ -124,9 +124,7 @@ pub fn query(config: &str) -> Result<QueryRecord, String> {
     let (test, sees_bias) = match q.visibility {
         OldVisibility::None => (VisibilityTest::None, false),
         OldVisibility::Moments { power, floor } => (VisibilityTest::Chebyshev { power, floor }, true),
-        OldVisibility::Surface { .. } => {
-            (VisibilityTest::Table(TableTest { reach_voxels: 3, strip: 0.25 }), false)
-        }
+        OldVisibility::Surface { .. } => (VisibilityTest::Table(TableTest { reach_voxels: 3, strip: 0.25 }), false),
     };
     let bias = |bias: f32| if sees_bias { bias } else { 0.0 };
     Ok(QueryRecord {

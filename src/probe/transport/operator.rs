@@ -77,6 +77,18 @@ impl<C: Captures> Operator<'_, C> {
         (found.into_iter().flat_map(|(irradiance, _)| irradiance).map(Vec3::from).collect(), non_finite)
     }
 
+    /// Irradiance of every probe from the emission that its own rays met, which bounces begin with where it is gathered.
+    pub fn gathered_emission(&self, volume: &Volume) -> Field {
+        let of_probe = |p: usize| -> Vec<Vec3A> {
+            let mut irradiance = vec![Vec3A::ZERO; self.kernel.rows()];
+            if self.gathers_emission {
+                self.captures.with(p, |capture| self.kernel.irradiance(&capture.emitted_radiance(), &mut irradiance));
+            }
+            irradiance
+        };
+        self.gather(volume, of_probe).into_iter().flatten().map(Vec3::from).collect()
+    }
+
     /// The operator's norm ‖T‖∞ per channel: the most that it makes of irradiance 1 everywhere, and so a bound of its
     /// spectral radius. Weights of queries and filter are positive and sum to at most 1, so what remains is the filtered
     /// albedo; queries that find no probe can only lower it.

@@ -112,8 +112,10 @@ pub fn solve<C: Captures>(
     let is_linear = operator.is_linear(volume);
     let mut masks: Option<Masks> = None;
     let most = settings.most();
-    // The first reflection is that of light which did not pass through probes; without any, hits were not even kept.
-    let first = most.min(1);
+    // Emission that is gathered passes through the probes before it is reflected at all, other light does not. Where
+    // reflections are counted, it goes first, so that each bounce is one reflection of both.
+    let emission_first = most == 0 || settings.max_bounces.is_some() && operator.gathers_emission;
+    let first = u32::from(!emission_first);
     let done = progress.solution.bounces.len() as u32;
     if done == 0 {
         progress.solution.operator_norm = Some(operator.norm(volume).as_dvec3().to_array());
@@ -125,7 +127,10 @@ pub fn solve<C: Captures>(
         // Before the first there is nothing in the probes to ask for.
         let masks = (index > first).then(|| &*masks.get_or_insert_with(|| operator.masks(volume)));
         let x = field_of(volume);
-        let (g, non_finite) = operator.apply(volume, masks);
+        let (g, non_finite) = match index {
+            0 => (operator.gathered_emission(volume), 0),
+            _ => operator.apply(volume, masks),
+        };
         let change = measure(&x, &g);
         let Progress { solution, control, history } = &mut progress;
         let rising = solution

@@ -83,6 +83,10 @@ fn a_number_of_bounces_is_a_number_of_reflections() {
         for most in 0..6 {
             // Emission reaches the probe itself; each reflection adds a term of the series.
             let reflected: f32 = (1..=most).map(|k| DIRECT * albedo.powi(k as i32 - 1)).sum();
+            let emitted: f32 = (0..=most).map(|k| EMITTED * albedo.powi(k as i32)).sum();
+            // Emission that is gathered is reflected like the rest.
+            let (gathered, _) = World::new(albedo).irradiance(&bounces(Some(most), Acceleration::Auto), true);
+            assert_near(gathered, PI * (emitted + reflected), albedo);
             let (found, solution) = World::new(albedo).irradiance(&bounces(Some(most), Acceleration::Auto), false);
             assert_near(found, PI * (EMITTED + reflected), albedo);
             let indices: Vec<u32> = solution.bounces.iter().map(|b| b.index).collect();

@@ -1,177 +1,224 @@
-//! Two reports, figure by figure. Read as plain JSON: reports grow, and a figure that only one side has is a finding and
-//! no mistake.
+//! What reports and comparisons say, figure by figure. Reports grow, so they are read as plain JSON: a figure that only one side has
+//! is a finding and no mistake.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Value, json};
 
-use super::gate::{Direction, Finding};
-use super::storage;
 use crate::config::Config;
+use crate::report::page::ConfigChange;
 
-/// What is no figure of the result.
-const NOT_FIGURES: &[&str] = &["seed", "bake_seed", "threads", "exposure_ev", "bounces", "plan"];
+/// Keys of a report that are not figures of the result.
+const NOT_FIGURES: [&str; 6] = ["seed", "bake_seed", "threads", "exposure_ev", "bounces", "plan"];
+
+/// Every value of a JSON document by its place, such as "methods.visibility_on.leak.light". Members of lists have the place of their
+/// name; a list without names is one value.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Facts(BTreeMap<String, Value>);
 
 /// One number of a report on both sides.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Figure {
     pub item: String,
-    /// Its place in the report, such as "methods.visibility_on.leak.light".
     pub name: String,
     pub base: Option<f64>,
     pub candidate: Option<f64>,
     pub difference: Option<f64>,
 }
 
-/// How a figure is judged.
-#[derive(Clone, Copy)]
-pub(super) struct Rule {
-    /// Place in what is judged, such as "leak.light".
-    pub(super) place: &'static str,
-    pub(super) gate: &'static str,
-    how: How,
-    unit: &'static str,
-    explanation: &'static str,
-}
+impl Facts {
+    /// Of a report, with what follows from its lists and its configuration.
+    pub fn of_report(report: &Value) -> Facts {
+        let mut facts = Facts::of(report);
+        let mut put = |place: String, value: Value| facts.0.insert(place, value);
+        if let Some(last) = report["bounces"].as_array().and_then(|bounces| bounces.last()) {
+            put("energy".to_owned(), last["energy"].clone());
+        }
+        if let Some(config) = report["config"].as_str().and_then(|text| Config::parse(text, "").ok()) {
+            let fineness = config.store.irradiance.fineness();
+            put("stored.precision".to_owned(), json!(fineness.rounding));
+            put("stored.border".to_owned(), json!(config.store.border));
+            put("stored.resolution".to_owned(), json!(fineness.resolution));
+        }
+        for configuration in report["configurations"].as_array().into_iter().flatten() {
+            let (Some(label), Some(runs)) = (configuration["label"].as_str(), configuration["runs"].as_array()) else {
+                continue;
+            };
+            let converged = runs.iter().filter(|run| run["converged"] == true).count();
+            put(format!("configurations.{label}.seeds"), json!(runs.len()));
+            put(format!("configurations.{label}.converged"), json!(converged as f64 / runs.len() as f64));
+        }
+        facts
+    }
 
-impl Rule {
-    /// The same rule for a figure that stands elsewhere.
-    pub(super) fn at(self, place: &'static str) -> Rule {
-        Rule { place, ..self }
+    pub fn of(value: &Value) -> Facts {
+        let mut facts = Facts::default();
+        facts.collect(value, "");
+        facts
+    }
+
+    fn collect(&mut self, value: &Value, place: &str) {
+        let below = |key: &str| join_by(place, key, '.');
+        let name = |member: &Value| {
+            ["name", "label", "method"].iter().find_map(|key| Some(member.get(key)?.as_str()?.to_owned()))
+        };
+        match value {
+            Value::Object(members) => members.iter().for_each(|(key, member)| self.collect(member, &below(key))),
+            Value::Array(members) if members.iter().any(|member| name(member).is_some()) => {
+                members.iter().filter_map(|m| Some((m, name(m)?))).for_each(|(m, name)| self.collect(m, &below(&name)));
+            }
+            leaf => {
+                self.0.insert(place.to_owned(), leaf.clone());
+            }
+        }
+    }
+
+    pub fn get(&self, place: &str) -> Option<&Value> {
+        self.0.get(place).filter(|value| !value.is_null())
+    }
+
+    /// A number, or 1 for yes and 0 for no.
+    pub fn number(&self, place: &str) -> Option<f64> {
+        let value = self.get(place)?;
+        value.as_f64().or_else(|| value.as_bool().map(|yes| f64::from(u8::from(yes))))
+    }
+
+    pub fn text(&self, place: &str) -> Option<&str> {
+        self.get(place)?.as_str()
+    }
+
+    /// Names of the configurations of a sweep.
+    pub fn configurations(&self) -> BTreeSet<&str> {
+        self.0.keys().filter_map(|place| place.strip_prefix("configurations.")?.strip_suffix(".label")).collect()
     }
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum How {
-    /// By the difference: more is worse.
-    Increase,
-    /// By the ratio, percent: more is worse.
-    Growth,
-    /// By the difference of magnitudes: farther from 0 is worse.
-    Magnitude,
-    /// By the difference: less is worse.
-    Decrease,
+/// What the random numbers of both sides have to do with each other.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Seeds {
+    /// Nothing tells, as of pictures alone. They are taken for equal.
+    #[default]
+    Unknown,
+    Equal,
+    Other,
 }
 
-pub(super) const fn rule(
-    place: &'static str,
-    gate: &'static str,
-    how: How,
-    unit: &'static str,
-    explanation: &'static str,
-) -> Rule {
-    Rule { place, gate, how, unit, explanation }
-}
-
-/// What two reports of a kind give.
-#[derive(Debug, Default)]
-pub struct Compared {
-    pub figures: Vec<Figure>,
-    pub findings: Vec<Finding>,
-}
-
-/// A number at a path such as "leak.light".
-pub fn number(value: &Value, path: &str) -> Option<f64> {
-    path.split('.').try_fold(value, |value, key| value.get(key))?.as_f64()
-}
-
-/// Every number of a report by its place; members of lists by their name, where they have one.
-fn flatten(value: &Value, place: &str, out: &mut BTreeMap<String, Option<f64>>) {
-    let dotted = |key: &str| if place.is_empty() { key.to_owned() } else { format!("{place}.{key}") };
-    match value {
-        Value::Object(members) => {
-            for (key, member) in members.iter().filter(|(key, _)| !NOT_FIGURES.contains(&key.as_str())) {
-                flatten(member, &dotted(key), out);
-            }
+impl Seeds {
+    /// All seeds that went into both sides count: a render's own is that of its lamps' samples, its probes have that of their bake.
+    pub fn of(sides: [&Facts; 2]) -> Seeds {
+        let is_render = sides.iter().any(|side| side.text("command") == Some("render"));
+        let is_sweep = sides.iter().all(|side| side.get("seeds").is_some());
+        let keys: &[&str] = match (is_render, is_sweep) {
+            (true, _) => &["seed", "bake_seed"],
+            (_, true) => &["seeds"],
+            _ => &["seed"],
+        };
+        let equal = |key: &&str| sides[0].get(key).zip(sides[1].get(key)).map(|(base, candidate)| base == candidate);
+        let equal: Vec<Option<bool>> = keys.iter().map(equal).collect();
+        match equal {
+            _ if equal.contains(&Some(false)) => Seeds::Other,
+            _ if equal.contains(&None) => Seeds::Unknown,
+            _ => Seeds::Equal,
         }
-        Value::Array(members) => {
-            for member in members {
-                let name = ["name", "label", "method"].into_iter().find_map(|key| member.get(key)?.as_str());
-                if let Some(name) = name {
-                    flatten(member, &dotted(name), out);
-                }
-            }
-        }
-        Value::Number(number) => {
-            out.insert(place.to_owned(), number.as_f64());
-        }
-        // Booleans and words are not figures; null is one that is not defined.
-        Value::Null => {
-            out.insert(place.to_owned(), None);
-        }
-        Value::Bool(_) | Value::String(_) => {}
     }
 }
 
-/// All figures of two reports side by side.
-pub fn side_by_side(item: &str, base: &Value, candidate: &Value) -> Vec<Figure> {
-    let [mut a, mut b] = [BTreeMap::new(), BTreeMap::new()];
-    flatten(base, "", &mut a);
-    flatten(candidate, "", &mut b);
-    let names: std::collections::BTreeSet<String> = a.keys().chain(b.keys()).cloned().collect();
-    let figure = |name: String| {
-        let (base, candidate) = (a.get(&name).copied().flatten(), b.get(&name).copied().flatten());
-        let difference = base.zip(candidate).map(|(b, c)| c - b);
-        Figure { item: item.to_owned(), name, base, candidate, difference }
-    };
-    names.into_iter().map(figure).filter(|f| f.base.is_some() || f.candidate.is_some()).collect()
+/// A number at a place such as "figures.leak_light.mean".
+pub fn number(value: &Value, place: &str) -> Option<f64> {
+    place.split('.').try_fold(value, |value, key| value.get(key))?.as_f64()
 }
 
-/// Judges one figure. `errors`: of the sides, which are independent.
-pub(super) fn apply(rule: &Rule, item: &str, values: [Option<f64>; 2], errors: [Option<f64>; 2]) -> Finding {
-    let [b, c] = values;
-    let difference = |direction| Finding::difference(rule.gate, item, values, rule.unit, direction, rule.explanation);
-    let found = match rule.how {
-        How::Increase => difference(Direction::Increase),
-        How::Growth => Finding::ratio(rule.gate, item, values, Direction::Increase, rule.explanation),
-        How::Magnitude => {
-            let value = b.zip(c).map(|(b, c)| c.abs() - b.abs());
-            Finding { value, ..difference(Direction::Increase) }
+/// Name of a part of an item.
+pub fn join(item: &str, part: &str) -> String {
+    join_by(item, part, '/')
+}
+
+fn join_by(item: &str, part: &str, by: char) -> String {
+    if item.is_empty() || part.is_empty() { format!("{item}{part}") } else { format!("{item}{by}{part}") }
+}
+
+/// All figures of two reports.
+pub fn side_by_side(item: &str, sides: [&Facts; 2]) -> Vec<Figure> {
+    let names: BTreeSet<&String> = sides.iter().flat_map(|side| side.0.keys()).collect();
+    let is_figure = |name: &&String| !name.split('.').any(|key| NOT_FIGURES.contains(&key));
+    let figure = |name: &String| {
+        let [base, candidate] = sides.map(|side| side.0.get(name)?.as_f64());
+        base.or(candidate)?;
+        let difference = base.zip(candidate).map(|(base, candidate)| candidate - base);
+        Some(Figure { item: item.to_owned(), name: name.clone(), base, candidate, difference })
+    };
+    names.into_iter().filter(is_figure).filter_map(figure).collect()
+}
+
+/// Keys of two effective configurations that differ; nothing where this program cannot read one of them.
+pub fn config_changes(texts: [Option<&str>; 2]) -> Vec<ConfigChange> {
+    let facts = |text: Option<&str>| Some(Facts::of(&serde_json::to_value(Config::parse(text?, "").ok()?).ok()?));
+    let [Some(base), Some(candidate)] = texts.map(facts) else { return Vec::new() };
+    let keys: BTreeSet<&String> = base.0.keys().chain(candidate.0.keys()).collect();
+    let value = |facts: &Facts, key: &String| facts.0.get(key).map(|v| v.to_string().trim_matches('"').to_owned());
+    let change =
+        |key: &String| ConfigChange { key: key.clone(), base: value(&base, key), candidate: value(&candidate, key) };
+    keys.into_iter().map(change).filter(|change| change.base != change.candidate).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn configurations_are_compared_by_key() {
+        let with = |assignments: &[&str]| {
+            let assignments: Vec<String> = assignments.iter().map(|a| (*a).to_owned()).collect();
+            Config::default().with_overrides(&assignments).unwrap().to_ron()
+        };
+        let base = with(&[]);
+        assert_eq!(config_changes([Some(&base), Some(&base)]), []);
+        let changes = config_changes([Some(&base), Some(&with(&["query.visibility=none", "encoding.border=0"]))]);
+        let names: Vec<&str> = changes.iter().map(|c| c.key.as_str()).collect();
+        assert_eq!(
+            names,
+            [
+                "query.test",
+                "query.test.table.reach_voxels",
+                "query.test.table.strip",
+                "store.border",
+                "store.occlusion",
+                "store.occlusion.surface.voxels_per_cell"
+            ]
+        );
+        assert_eq!(changes[3].candidate.as_deref(), Some("0"));
+    }
+
+    #[test]
+    fn members_of_lists_have_their_name() {
+        let report = json!({"methods": [{"name": "a", "leak": {"light": 0.5}}], "bounces": [{"energy": 2.0}], "seed": 3,
+                            "configurations": [{"label": "x.y=1", "runs": [{"converged": true}, {"converged": false}]}]});
+        let facts = Facts::of_report(&report);
+        assert_eq!((facts.number("methods.a.leak.light"), facts.number("energy")), (Some(0.5), Some(2.0)));
+        assert_eq!(facts.number("configurations.x.y=1.converged"), Some(0.5));
+        assert_eq!(facts.configurations(), BTreeSet::from(["x.y=1"]));
+        let names: Vec<String> = side_by_side("", [&facts, &facts]).into_iter().map(|figure| figure.name).collect();
+        assert_eq!(
+            names,
+            ["configurations.x.y=1.converged", "configurations.x.y=1.seeds", "energy", "methods.a.leak.light"]
+        );
+    }
+
+    #[test]
+    fn every_seed_of_a_side_counts() {
+        let render = |seed: u64, bake: Value| json!({"command": "render", "seed": seed, "bake_seed": bake});
+        for (a, b, expected) in [
+            (render(0, json!(1)), render(0, json!(1)), Seeds::Equal),
+            (render(0, json!(1)), render(0, json!(2)), Seeds::Other),
+            (render(0, json!(1)), render(3, json!(1)), Seeds::Other),
+            (render(0, json!(null)), render(0, json!(1)), Seeds::Unknown),
+            (json!({"command": "bake", "seed": 4}), json!({"command": "bake", "seed": 4}), Seeds::Equal),
+            (json!({"seed": 0, "seeds": [0, 1]}), json!({"seed": 0, "seeds": [0, 1]}), Seeds::Equal),
+            (json!({"seed": 0, "seeds": [0, 1]}), json!({"seed": 0, "seeds": [0, 1, 2]}), Seeds::Other),
+            (json!({}), json!({}), Seeds::Unknown),
+        ] {
+            assert_eq!(Seeds::of([&Facts::of(&a), &Facts::of(&b)]), expected, "{a} {b}");
         }
-        How::Decrease => {
-            let value = b.zip(c).map(|(b, c)| b - c);
-            Finding { value, ..difference(Direction::Increase) }
-        }
-    };
-    let error = match (rule.how, b.zip(c), errors[0].zip(errors[1])) {
-        // Of c/b in percent, from the relative errors of both.
-        (How::Growth, Some((b, c)), Some((of_b, of_c))) => Some(100.0 * (c / b).abs() * (of_b / b).hypot(of_c / c)),
-        (_, _, Some((of_b, of_c))) => Some(of_b.hypot(of_c)),
-        _ => None,
-    };
-    found.with_error(error.filter(|error| error.is_finite()))
-}
-
-pub(super) fn apply_all(rules: &[Rule], item: &str, [base, candidate]: [&Value; 2]) -> Vec<Finding> {
-    let found = rules.iter().map(|rule| {
-        let values = [base, candidate].map(|v| number(v, rule.place));
-        let errors = [base, candidate].map(|v| number(v, &format!("standard_error.{}", rule.place)));
-        apply(rule, item, values, errors)
-    });
-    // A figure that neither has says nothing.
-    found.filter(|f| f.base.is_some() || f.candidate.is_some()).collect()
-}
-
-/// The scenes of two reports.
-pub fn scene(item: &str, [base, candidate]: [&str; 2]) -> Finding {
-    let differs = base != candidate;
-    let explanation = if differs {
-        "The scene's files or its sky are others than the base's: no figure of light can be relied on to be about the bake."
-    } else {
-        "Both sides are of the same scene and sky."
-    };
-    let found = Finding::difference("scene", item, [None, None], "", Direction::Increase, explanation);
-    Finding { value: Some(f64::from(u8::from(differs))), ..found }
-}
-
-pub(super) fn scenes(item: &str, base: &Value, candidate: &Value) -> Option<Finding> {
-    Some(scene(item, [base["scene_blake3"].as_str()?, candidate["scene_blake3"].as_str()?]))
-}
-
-/// How the configurations store irradiance; nothing where this program cannot read them.
-pub(super) fn storage(item: &str, reports: [&Value; 2]) -> Vec<Finding> {
-    let [a, b] = reports.map(|v| v["config"].as_str().and_then(|text| Config::parse(text, "").ok()));
-    let (Some(a), Some(b)) = (a, b) else { return Vec::new() };
-    storage::storage(item, [a, b].map(|c| (c.store.irradiance.fineness(), c.store.border)))
+    }
 }

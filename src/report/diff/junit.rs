@@ -2,9 +2,9 @@
 
 use quick_junit::{NonSuccessKind, Report, SerializeError, TestCase, TestCaseStatus, TestSuite};
 
-use super::DiffReport;
-use super::gate::Gate;
-use crate::report::words::{in_unit, outcome};
+use super::report::DiffReport;
+use crate::report::gate::Gate;
+use crate::report::words::{in_unit, outcome, value};
 
 /// The whole document.
 ///
@@ -19,13 +19,8 @@ pub fn text(report: &DiffReport) -> Result<String, SerializeError> {
 }
 
 fn case(gate: &Gate) -> TestCase {
-    let message = format!(
-        "{}: {}, threshold {} ({})",
-        gate.name,
-        in_unit(gate.value, gate.unit),
-        in_unit(gate.threshold, gate.unit),
-        gate.source
-    );
+    let message =
+        format!("{}: {}, threshold {} ({})", gate.name, value(gate), in_unit(gate.threshold, gate.unit), gate.source);
     let status = match gate {
         _ if gate.fails() => {
             let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);

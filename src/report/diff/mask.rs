@@ -2,11 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use super::DiffError;
+use super::error::DiffError;
 use crate::image::AnyImage;
 use crate::math::color::luminance;
 
-/// Which pixels count.
 #[derive(Debug, Clone)]
 pub struct Mask {
     pub path: PathBuf,
@@ -18,18 +17,15 @@ pub struct Mask {
 
 impl Mask {
     /// Reads a picture whose white pixels count: those of at least half the code.
+    ///
+    /// # Errors
+    /// A picture that cannot be read, or has no white pixel.
     pub fn read(path: &Path) -> Result<Mask, DiffError> {
         let image = AnyImage::read(path, |_| true)?.image;
-        let counts: Vec<bool> = image
-            .layers()
-            .next()
-            .map(|(_, pixels)| pixels.iter().map(|p| luminance(*p) >= 0.5).collect())
-            .unwrap_or_default();
+        let first = image.layers().next().map(|(_, pixels)| pixels).unwrap_or_default();
+        let counts: Vec<bool> = first.iter().map(|pixel| luminance(*pixel) >= 0.5).collect();
         if !counts.contains(&true) {
-            return Err(DiffError::Mask {
-                path: path.to_owned(),
-                what: "it has no white pixel; paint white what counts".into(),
-            });
+            return Err(DiffError::file(path, "the mask has no white pixel; paint white what counts"));
         }
         Ok(Mask { path: path.to_owned(), width: image.width, height: image.height, counts })
     }

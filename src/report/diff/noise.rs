@@ -1,68 +1,62 @@
-//! Whether the two sides drew the same random numbers.
+//! What noise alone may do.
 //!
-//! Where they did, what did not change is equal to the last digit, and every difference is a change. Where they did not, probes
-//! differ by their noise, and a picture by that of all the probes that light it.
+//! Equal seeds draw the same random numbers: what did not change is equal up to rounding, and every difference is a change. Between
+//! other seeds a difference is judged by the measured spread of several seeds. The base has them as results side by side, or both
+//! sides as a sweep's runs. Where there is one seed only, the wide bounds `other_seeds` of the thresholds hold.
 
-use serde_json::Value;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// What the random numbers of both sides have to do with each other.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Noise {
-    /// Nothing tells, as of pictures alone: taken for the same.
-    #[default]
-    Unknown,
-    Same,
-    Other,
+use super::rules::{Finding, How};
+use crate::math::statistics::Moments;
+
+/// Chance that noise alone fails any gate of a comparison that measures it. Each of N gates gets an N-th (Bonferroni).
+pub const SIGNIFICANCE: f64 = 0.01;
+
+/// Puts the spread between the base's seeds into the findings. `between`: findings of the base's first seed against each other one.
+///
+/// A figure of a side is compared with the mean over the seeds. A figure of a pair is compared with those of the pairs of the base, so
+/// that three seeds are the least. The standard error is that of one more value beside n: s·√(1 + 1/n).
+pub fn measure(findings: &mut [Finding], between: &[Vec<Finding>]) {
+    for found in findings {
+        let is_same = |other: &&Finding| other.rule.gate == found.rule.gate && other.item == found.item;
+        let others: Option<Vec<&Finding>> = between.iter().map(|all| all.iter().find(is_same)).collect();
+        let Some(others) = others else { continue };
+        let sample: Option<Vec<f64>> = match found.rule.how {
+            How::Pair => others.iter().map(|other| other.value).collect(),
+            _ => std::iter::once(found.base).chain(others.iter().map(|other| other.candidate)).collect(),
+        };
+        let Some(mut sample) = sample else { continue };
+        if found.rule.how != How::Pair {
+            let mean = moments(&sample).mean();
+            let values: Option<Vec<f64>> = sample.iter().map(|value| found.rule.how.value(mean, *value)).collect();
+            let Some(values) = values else { continue };
+            sample = values;
+            found.base = Some(mean);
+            found.value = found.candidate.and_then(|candidate| found.rule.how.value(mean, candidate));
+        }
+        let (moments, n) = (moments(&sample), sample.len() as f64);
+        if n >= 2.0 {
+            found.noise = (found.rule.how == How::Pair).then(|| moments.mean());
+            found.standard_error = Some((moments.variance() * n / (n - 1.0) * (1.0 + 1.0 / n)).sqrt());
+            found.freedom = Some(n - 1.0);
+        }
+    }
 }
 
-impl Noise {
-    /// From the sides' seeds.
-    pub fn of(seeds: [Option<u64>; 2]) -> Noise {
-        match seeds {
-            [Some(a), Some(b)] if a == b => Noise::Same,
-            [Some(_), Some(_)] => Noise::Other,
-            _ => Noise::Unknown,
-        }
-    }
+fn moments(sample: &[f64]) -> Moments {
+    let mut moments = Moments::default();
+    sample.iter().for_each(|value| moments.add(*value, 1.0));
+    moments
+}
 
-    /// Of two reports of one kind: all of the seeds that went into them.
-    pub fn of_reports(reports: [&Value; 2]) -> Noise {
-        let number = |key: &str| Noise::of(reports.map(|report| report[key].as_u64()));
-        let [a, b] = reports.map(|report| report["seeds"].as_array());
-        match (a, b) {
-            // A sweep.
-            (Some(a), Some(b)) => {
-                if a == b {
-                    Noise::Same
-                } else {
-                    Noise::Other
-                }
-            }
-            // A render's own seed is that of its lamps' samples; its probes have that of their bake.
-            _ if reports.iter().any(|report| report["command"] == "render") => number("seed").and(number("bake_seed")),
-            _ => number("seed"),
-        }
-    }
-
-    /// A standard error of a mean, percent, as estimated from how unequally its parts changed, but no more than noise makes it. What is
-    /// broken is uneven too, and must not excuse itself: with the same random numbers three of it are a percent at most; with others
-    /// 21 %, where the largest change of a mean between seeds was 18 %.
-    pub fn at_most(self, error: f64) -> f64 {
-        error.min(if self == Noise::Same { 1.0 / 3.0 } else { 7.0 })
-    }
-
-    /// The same of the noise of single probes, percent: between seeds it was 13 in the worst scene; with the same seed twenty of these,
-    /// the default of `probes.worst`, are a fifth of a probe's own light.
-    pub fn of_probe_at_most(self, error: f64) -> f64 {
-        error.min(if self == Noise::Same { 1.0 } else { 14.0 })
-    }
-
-    fn and(self, other: Noise) -> Noise {
-        match (self, other) {
-            (Noise::Other, _) | (_, Noise::Other) => Noise::Other,
-            (Noise::Same, Noise::Same) => Noise::Same,
-            _ => Noise::Unknown,
-        }
+/// Turns measured spreads into bounds at [`SIGNIFICANCE`], by Student's t.
+pub fn bound(findings: &mut [Finding]) {
+    let gates = findings.iter().filter(|found| found.freedom.is_some()).count();
+    let level = 1.0 - 0.5 * SIGNIFICANCE / gates.max(1) as f64;
+    for found in findings {
+        let Some(student) = found.freedom.and_then(|freedom| StudentsT::new(0.0, 1.0, freedom).ok()) else { continue };
+        let spread = found.standard_error.map(|error| student.inverse_cdf(level) * error);
+        found.noise = spread.map(|spread| found.noise.unwrap_or(0.0) + spread);
     }
 }
 
@@ -70,22 +64,42 @@ impl Noise {
 mod tests {
     use serde_json::json;
 
+    use super::super::figures::{Facts, Seeds};
+    use super::super::rules::findings;
     use super::*;
 
+    fn of_image(mean: f64, candidate: f64, rmse: f64) -> Vec<Finding> {
+        let pair = json!({"mean_base": mean, "mean_candidate": candidate, "rmse_percent": rmse});
+        findings("image", "", [&Facts::default(); 2], &Facts::of(&pair), Seeds::Other)
+    }
+
     #[test]
-    fn every_seed_of_a_side_counts() {
-        let render = |seed: u64, bake: Value| json!({"command": "render", "seed": seed, "bake_seed": bake});
-        for (a, b, expected) in [
-            (render(0, json!(1)), render(0, json!(1)), Noise::Same),
-            (render(0, json!(1)), render(0, json!(2)), Noise::Other),
-            (render(0, json!(1)), render(3, json!(1)), Noise::Other),
-            (render(0, json!(null)), render(0, json!(1)), Noise::Unknown),
-            (json!({"command": "bake", "seed": 4}), json!({"command": "bake", "seed": 4}), Noise::Same),
-            (json!({"seed": 0, "seeds": [0, 1]}), json!({"seed": 0, "seeds": [0, 1]}), Noise::Same),
-            (json!({"seed": 0, "seeds": [0, 1]}), json!({"seed": 0, "seeds": [0, 1, 2]}), Noise::Other),
-            (json!({}), json!({}), Noise::Unknown),
-        ] {
-            assert_eq!(Noise::of_reports([&a, &b]), expected, "{a} {b}");
-        }
+    fn spread_is_measured_between_seeds() {
+        let between = [of_image(1.0, 1.1, 4.0), of_image(1.0, 0.9, 6.0)];
+        let mut found = of_image(1.0, 1.5, 9.0);
+        measure(&mut found, &between);
+        let of = |gate: &str| found.iter().find(|f| f.rule.gate == gate).cloned().unwrap();
+        // Three seeds with means 1, 1.1, 0.9: deviation 10 %, and that of one more beside their mean √(4/3) of it.
+        let mean = of("image.mean");
+        assert!((mean.value.unwrap() - 50.0).abs() < 1e-9 && (mean.base.unwrap() - 1.0).abs() < 1e-12);
+        assert!(
+            (mean.standard_error.unwrap() - 10.0 * (4.0_f64 / 3.0).sqrt()).abs() < 1e-9 && mean.freedom == Some(2.0)
+        );
+        // Two pairs of seeds with 4 and 6 %.
+        let rmse = of("image.rmse");
+        assert!((rmse.standard_error.unwrap() - 3.0_f64.sqrt()).abs() < 1e-9 && rmse.freedom == Some(1.0));
+        bound(&mut found);
+        // Of two gates each has 0.5 %, two-sided 0.25 %. Tables: t = 14.09 with two degrees of freedom, 127.3 with one.
+        let bound = |gate: &str| found.iter().find(|f| f.rule.gate == gate).unwrap().noise.unwrap();
+        assert!((bound("image.mean") / (14.09 * mean.standard_error.unwrap()) - 1.0).abs() < 1e-3);
+        assert!((bound("image.rmse") / (5.0 + 127.3 * 3.0_f64.sqrt()) - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn two_seeds_do_not_tell_about_pairs() {
+        let mut found = of_image(1.0, 1.5, 9.0);
+        measure(&mut found, &[of_image(1.0, 1.1, 4.0)]);
+        let freedom: Vec<Option<f64>> = found.iter().map(|f| f.freedom).collect();
+        assert_eq!(freedom, [Some(1.0), None]);
     }
 }

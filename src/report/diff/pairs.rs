@@ -1,122 +1,125 @@
 //! What of the two sides belongs together, and whether it can be compared.
 
-use std::path::Path;
-
-use serde_json::Value;
-
-use super::images::{self, LIGHT, Pair, join};
+use super::error::DiffError;
+use super::figures::{Seeds, join};
+use super::images::{self, Pair};
 use super::mask::Mask;
-use super::noise::Noise;
-use super::sides::{Item, RENDER_PICTURES, Side};
-use super::{DiffError, Request, figures};
+use super::sides::{Item, Kind, Side};
+
+/// Pictures of `render` that are compared, with whether they decide.
+const PICTURES: [(&str, bool); 2] = [("visibility_on.exr", true), ("visibility_off.exr", false)];
+
+/// An item of the candidate and the base's of the same name: one, or one for each of several seeds.
+pub struct Paired<'a> {
+    pub name: &'a str,
+    pub bases: Vec<&'a Item>,
+    pub candidate: &'a Item,
+}
 
 /// Items by name: of both, and of one side only.
-pub(super) struct Pairs<'a> {
-    pub(super) both: Vec<(&'a str, &'a Item, &'a Item)>,
-    pub(super) added: Vec<String>,
-    pub(super) missing: Vec<String>,
+pub struct Pairs<'a> {
+    pub both: Vec<Paired<'a>>,
+    pub added: Vec<String>,
+    pub missing: Vec<String>,
 }
 
-pub(super) fn pair_up(sides: &[Side; 2]) -> Result<Pairs<'_>, DiffError> {
-    let [base, candidate] = sides;
-    let incomparable =
-        |what: String| DiffError::Incomparable { base: base.path.clone(), candidate: candidate.path.clone(), what };
-    if let (Some((_, a)), Some((_, b))) = (base.single(), candidate.single()) {
-        if a.kind() != b.kind() {
-            return Err(incomparable(format!("one is {}, the other {}", a.kind().name(), b.kind().name())));
-        }
-        if base.items.contains_key("") && candidate.items.contains_key("") {
-            return Ok(Pairs { both: vec![("", a, b)], added: Vec::new(), missing: Vec::new() });
-        }
-    }
-    if base.items.contains_key("") != candidate.items.contains_key("") {
-        return Err(incomparable(format!(
-            "one is {}, the other {}; give two of a kind",
-            base.description(),
-            candidate.description()
-        )));
-    }
-    let mut both = Vec::new();
-    for (name, a) in &base.items {
-        let Some(b) = candidate.items.get(name) else { continue };
-        if a.kind() != b.kind() {
-            let (a, b) = (a.kind().name(), b.kind().name());
-            return Err(incomparable(format!("{name} is {a} in one and {b} in the other")));
-        }
-        both.push((name.as_str(), a, b));
+/// # Errors
+/// Sides without a common name, of two kinds, or of cameras or sizes that differ.
+pub fn pair_up([base, candidate]: &[Side; 2]) -> Result<Pairs<'_>, DiffError> {
+    let common = |(name, item)| Some(Paired { name, bases: vec![base.items.get(name)?], candidate: item });
+    let names = candidate.items.iter().map(|(name, item)| (name.as_str(), item));
+    let mut both: Vec<Paired> = names.filter_map(common).collect();
+    let mut only = [(candidate, base), (base, candidate)]
+        .map(|(x, y)| x.items.keys().filter(|name| !y.items.contains_key(*name)).cloned().collect::<Vec<_>>());
+    if both.is_empty()
+        && let Some(of_seeds) = seeds_side_by_side(base, candidate)
+    {
+        (both, only) = (of_seeds, Default::default());
     }
     if both.is_empty() {
-        return Err(incomparable("no name is in both folders; name the files of both alike".to_owned()));
+        let (a, b) = (base.description(), candidate.description());
+        let what = format!("one is {a}, the other {b}, and no name is in both; give two of a kind, with names alike");
+        return Err(DiffError::incomparable([&base.path, &candidate.path], what));
     }
-    let only = |x: &Side, y: &Side| x.items.keys().filter(|name| !y.items.contains_key(*name)).cloned().collect();
-    Ok(Pairs { both, added: only(candidate, base), missing: only(base, candidate) })
+    for Paired { bases, candidate, .. } in &mut both {
+        bases.iter().try_for_each(|base| alike(base, candidate))?;
+        let seeds = |a: &Item, b: &Item| Seeds::of([&a.facts, &b.facts]);
+        // The noise of an equal seed is no noise at all.
+        if let Some(equal) = bases.iter().position(|base| seeds(base, candidate) == Seeds::Equal) {
+            *bases = vec![bases[equal]];
+        }
+        let mut pairs = bases.iter().enumerate().flat_map(|(i, a)| bases[..i].iter().map(move |b| (a, b)));
+        if let Some((a, b)) = pairs.find(|(a, b)| seeds(a, b) != Seeds::Other) {
+            let what = "both are of one seed, or do not tell it; give the base's results with a seed each";
+            return Err(DiffError::incomparable([&a.path, &b.path], what));
+        }
+    }
+    let [added, missing] = only;
+    Ok(Pairs { both, added, missing })
 }
 
-/// The pictures of two folders of `render` that are there on both sides.
-pub(super) fn pictures<'m>(
-    name: &str,
-    [base, candidate]: [&Path; 2],
-    report: &Value,
-    mask: Option<&'m Mask>,
-) -> Vec<Pair<'m>> {
-    let exposure_ev = figures::number(report, "exposure_ev").map(|ev| ev as f32);
-    let pair = |&(picture, judged): &(&str, bool)| {
-        let [base, candidate] = [base, candidate].map(|folder| folder.join(format!("{picture}.exr")));
-        Pair { item: join(name, picture), base, candidate, judged, exposure_ev, noise: Noise::Unknown, mask }
+/// A base that holds the candidate's items several times, in folders or files of a seed each; `None` where it is something else.
+fn seeds_side_by_side<'a>(base: &'a Side, candidate: &'a Side) -> Option<Vec<Paired<'a>>> {
+    let mut paired: Vec<Paired> =
+        candidate.items.iter().map(|(name, candidate)| Paired { name, bases: Vec::new(), candidate }).collect();
+    for (name, item) in &base.items {
+        let is_end = |end: &str| end.is_empty() || name.strip_suffix(end).is_some_and(|start| start.ends_with('/'));
+        let fitting = paired.iter_mut().filter(|paired| is_end(paired.name) && paired.candidate.kind == item.kind);
+        fitting.max_by_key(|paired| paired.name.len())?.bases.push(item);
+    }
+    paired.iter().all(|paired| paired.bases.len() > 1).then_some(paired)
+}
+
+/// The pictures of two folders of `render`, or two images.
+pub fn pictures<'m>(name: &str, [base, candidate]: [&Item; 2], mask: Option<&'m Mask>) -> Vec<Pair<'m>> {
+    let exposure_ev = base.facts.number("exposure_ev").map(|ev| ev as f32);
+    let seeds = Seeds::of([&base.facts, &candidate.facts]);
+    let pair = |(file, judged): (&str, bool)| {
+        let [a, b] =
+            [base, candidate].map(|item| if file.is_empty() { item.path.clone() } else { item.path.join(file) });
+        let item = join(name, file.trim_end_matches(".exr"));
+        Pair { item, base: a, candidate: b, judged, exposure_ev, seeds, mask }
     };
-    RENDER_PICTURES.iter().map(pair).collect()
-}
-
-/// Refuses what cannot be compared, before anything is. `kept`: see [`images::check`].
-pub(super) fn check(base: &Item, candidate: &Item, request: &Request, kept: f64) -> Result<f64, DiffError> {
-    let mask = request.mask;
-    match (base, candidate) {
-        (Item::Render { folder: a, report: b_report }, Item::Render { folder: b, report: c_report }) => {
-            same_view([a, b], [b_report, c_report])?;
-            let pairs = pictures("", [a, b], b_report, mask);
-            pairs
-                .iter()
-                .filter(|p| p.base.is_file() && p.candidate.is_file())
-                .try_fold(kept, |kept, pair| images::check(pair, kept))
-        }
-        (Item::Sweep(a), Item::Sweep(b)) => same_view([request.base, request.candidate], [a, b]).map(|()| kept),
-        (Item::Image(a), Item::Image(b)) => images::check(&image_pair("", a, b, mask), kept),
-        _ => Ok(kept),
+    match base.kind {
+        Kind::Render => PICTURES.map(pair).into(),
+        Kind::Image => vec![pair(("", true))],
+        _ => Vec::new(),
     }
 }
 
-/// Refuses reports of other cameras or sizes.
-fn same_view([base, candidate]: [&Path; 2], [a, b]: [&Value; 2]) -> Result<(), DiffError> {
-    for key in ["camera", "width", "height"] {
-        if a[key] != b[key] {
-            let what = format!("{key} {} and {key} {}; make both with the same --camera and --size", a[key], b[key]);
-            return Err(DiffError::Incomparable { base: base.to_owned(), candidate: candidate.to_owned(), what });
+/// Refuses pictures that cannot be compared, before any is. Returns how many pairs the page shows, at most.
+///
+/// # Errors
+/// See [`images::check`]; a mask that is for no picture.
+pub fn check(pairs: &Pairs, mask: Option<&Mask>) -> Result<usize, DiffError> {
+    let (mut kept, mut shown, mut found) = (0.0, 0, false);
+    for paired in &pairs.both {
+        for (i, base) in paired.bases.iter().enumerate() {
+            let pictures = pictures(paired.name, [base, paired.candidate], mask);
+            found |= !pictures.is_empty();
+            for pair in pictures.iter().filter(|pair| pair.base.is_file() && pair.candidate.is_file()) {
+                let after = images::check(pair, kept)?;
+                // Only the first of several seeds is shown.
+                if i == 0 {
+                    (kept, shown) = (after, shown + if base.kind == Kind::Render { images::LIGHT.len() } else { 1 });
+                }
+            }
         }
     }
-    Ok(())
+    let what = "no picture is compared; leave --mask out, or compare renders or images";
+    mask.filter(|_| !found).map_or(Ok(shown), |mask| Err(DiffError::file(&mask.path, what)))
 }
 
-pub(super) fn image_pair<'m>(name: &str, base: &Path, candidate: &Path, mask: Option<&'m Mask>) -> Pair<'m> {
-    Pair {
-        item: name.to_owned(),
-        base: base.to_owned(),
-        candidate: candidate.to_owned(),
-        judged: true,
-        exposure_ev: None,
-        noise: Noise::Unknown,
-        mask,
-    }
-}
-
-/// How many pairs of pictures the page shows, at most: two layers of a render's pictures, one of an image.
-pub(super) fn shown_pairs(pairs: &Pairs) -> usize {
-    let of_item = |(_, base, candidate): &(&str, &Item, &Item)| match (base, candidate) {
-        (Item::Render { folder: a, report }, Item::Render { folder: b, .. }) => {
-            let both = pictures("", [a, b], report, None);
-            LIGHT.len() * both.iter().filter(|p| p.base.is_file() && p.candidate.is_file()).count()
-        }
-        (Item::Image(_), Item::Image(_)) => 1,
-        _ => 0,
+/// Refuses items of two kinds, and reports of other cameras or sizes.
+fn alike(base: &Item, candidate: &Item) -> Result<(), DiffError> {
+    let differs = |key: &&str| base.report.get(key) != candidate.report.get(key);
+    let what = if base.kind != candidate.kind {
+        format!("one is {}, the other {}", base.kind.names()[1], candidate.kind.names()[1])
+    } else if let Some(key) = ["camera", "width", "height"].into_iter().find(differs) {
+        let [a, b] = [base, candidate].map(|item| &item.report[key]);
+        format!("{key} {a} and {key} {b}; make both with the same --camera and --size")
+    } else {
+        return Ok(());
     };
-    pairs.both.iter().map(of_item).sum()
+    Err(DiffError::incomparable([&base.path, &candidate.path], what))
 }

@@ -2,8 +2,7 @@
 
 use serde_json::Value;
 
-use super::figures::number;
-use super::images::join;
+use super::figures::{join, number};
 use crate::report::page::Plot;
 use crate::report::plot::{Chart, Mark, Series};
 

@@ -1,13 +1,16 @@
 //! What the gates are held to: `configs/diff.ron`, and a file of the user's on top of it.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+use wildmatch::WildMatchPattern;
 
-use super::gate::{Direction, Finding, Gate};
-use super::noise::Noise;
+use super::error::DiffError;
+use super::figures::Seeds;
+use super::rules::{Finding, How};
 use crate::config::messages;
+use crate::report::gate::Gate;
 use crate::system::input::read_file;
 
 /// The defaults, and the only place where they and the names of the gates are.
@@ -21,16 +24,13 @@ pub const DEFAULT: &str = "default";
 #[serde(default, deny_unknown_fields)]
 pub struct Limit {
     /// In the gate's own unit.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub absolute: Option<f64>,
     /// Share of the base's figure.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub relative: Option<f64>,
-    /// Standard errors of the figure, where they are known.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// Standard errors of the figure, where the reports have them.
     pub standard_errors: Option<f64>,
-    /// Like `relative`, where the sides drew other random numbers: what noise alone may do.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// What noise alone may do where the seeds are others and the base has one only: a share of the base's figure, of all light for
+    /// leaks, of `error.rmse` for `error.bias`.
     pub other_seeds: Option<f64>,
 }
 
@@ -52,16 +52,8 @@ struct File {
     exceptions: Vec<Exception>,
 }
 
-#[derive(Debug, thiserror::Error)]
-pub enum ThresholdsError {
-    #[error("cannot read the thresholds {path}: {cause}; give the path of a RON file such as configs/diff.ron")]
-    Unreadable { path: PathBuf, cause: std::io::Error },
-    #[error("{place}: {what}")]
-    Invalid { place: String, what: String },
-}
-
 /// The thresholds in effect.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Thresholds {
     pub gates: BTreeMap<String, Limit>,
     /// The last that fits holds.
@@ -74,39 +66,43 @@ pub struct Thresholds {
 
 impl Thresholds {
     /// The defaults, and those of a file on top of them.
-    pub fn load(path: Option<&Path>) -> Result<Thresholds, ThresholdsError> {
-        let defaults = parse(DEFAULTS, "configs/diff.ron")?;
-        let mut thresholds =
-            Thresholds { gates: defaults.gates, exceptions: Vec::new(), sources: BTreeMap::new(), file: None };
+    ///
+    /// # Errors
+    /// A file that cannot be read, and what is no threshold in it.
+    pub fn load(path: Option<&Path>) -> Result<Thresholds, DiffError> {
+        let File { gates, exceptions } = parse(DEFAULTS, "configs/diff.ron")?;
+        let mut thresholds = Thresholds { gates, exceptions, sources: BTreeMap::new(), file: None };
         if let Some(path) = path {
-            let unreadable = |cause| ThresholdsError::Unreadable { path: path.to_owned(), cause };
-            let bytes = read_file(path).map_err(unreadable)?;
-            let text = String::from_utf8(bytes).map_err(|e| unreadable(std::io::Error::other(e.utf8_error())))?;
+            let text = read_file(path).and_then(|bytes| String::from_utf8(bytes).map_err(std::io::Error::other));
+            let remedy = "give the path of a RON file such as configs/diff.ron";
+            let text = text.map_err(|cause| DiffError::file(path, format!("cannot be read: {cause}; {remedy}")))?;
             thresholds.put(&text, &path.display().to_string())?;
         }
         Ok(thresholds)
     }
 
     /// Lays a file over what is there.
-    fn put(&mut self, text: &str, place: &str) -> Result<(), ThresholdsError> {
+    fn put(&mut self, text: &str, place: &str) -> Result<(), DiffError> {
         let file = parse(text, place)?;
-        let invalid = |what: String| ThresholdsError::Invalid { place: place.to_owned(), what };
+        let known: Vec<String> = self.gates.keys().cloned().collect();
+        let check = |pattern: &str, limit: &Limit, fits: fn(&str, &str) -> bool| {
+            let bounds = [limit.absolute, limit.relative, limit.standard_errors, limit.other_seeds];
+            let what = if !known.iter().any(|name| fits(pattern, name)) {
+                messages::unknown_key(pattern, known.iter().map(String::as_str))
+            } else if !bounds.into_iter().flatten().all(|bound| bound >= 0.0 && bound.is_finite()) {
+                format!("{pattern}: write bounds from 0 up")
+            } else {
+                return Ok(());
+            };
+            Err(DiffError::file(Path::new(place), what))
+        };
         for (name, limit) in file.gates {
-            if !self.gates.contains_key(&name) {
-                return Err(invalid(messages::unknown_key(&name, self.gates.keys().map(String::as_str))));
-            }
-            check(&limit).map_err(|what| invalid(format!("gates: {name}: {what}")))?;
+            check(&name, &limit, |name, known| name == known)?;
             self.sources.insert(name.clone(), format!("{place}: gates.{name}"));
             self.gates.insert(name, limit);
         }
-        for exception in file.exceptions {
-            if !self.gates.keys().any(|name| fits(&exception.gate, name)) {
-                let names = self.gates.keys().map(String::as_str);
-                return Err(invalid(format!("exceptions: {}", messages::unknown_key(&exception.gate, names))));
-            }
-            check(&exception.limit).map_err(|what| invalid(format!("exceptions: {}: {what}", exception.item)))?;
-            self.exceptions.push(exception);
-        }
+        file.exceptions.iter().try_for_each(|exception| check(&exception.gate, &exception.limit, fits))?;
+        self.exceptions.extend(file.exceptions);
         self.file = Some(place.to_owned());
         Ok(())
     }
@@ -128,29 +124,25 @@ impl Thresholds {
     }
 
     /// Holds a finding against its limit.
-    pub fn judge(&self, finding: Finding) -> Gate {
-        let (limit, source) = self.limit(finding.name, &finding.item);
-        let Finding { name, item, base, candidate, value, unit, standard_error, noise, scale, direction, explanation } =
-            finding;
+    pub fn judge(&self, found: Finding) -> Gate {
+        let (limit, source) = self.limit(&found.rule.gate, &found.item);
+        let is_judged = limit != Limit::default();
+        // What noise may do is measured, or bounded where the seeds are others; the smaller of both.
+        let of_noise = limit.other_seeds.filter(|_| found.seeds == Seeds::Other).map(|share| share * found.scales[1]);
+        let known_error = found.standard_error.filter(|_| found.freedom.is_none());
         let bounds = [
             limit.absolute,
-            limit.relative.map(|share| share * scale),
-            limit.standard_errors.zip(standard_error).map(|(count, error)| count * error),
-            limit.other_seeds.filter(|_| noise == Noise::Other).map(|share| share * scale),
+            limit.relative.map(|share| share * found.scales[0]),
+            limit.standard_errors.zip(known_error).map(|(count, error)| count * error),
+            of_noise.into_iter().chain(found.noise).reduce(f64::min),
         ];
-        let is_judged = limit != Limit::default();
-        // A limit in standard errors alone, of a figure without one, allows nothing.
         let threshold = is_judged.then(|| bounds.into_iter().flatten().fold(0.0, f64::max));
-        let value = value.filter(|value| value.is_finite());
-        let against = value.map(|value| match direction {
-            Direction::Both => value.abs(),
-            Direction::Increase => value,
-        });
-        let undefined_alike = base.is_none() && candidate.is_none() && value.is_none();
+        let value = found.value.filter(|value| value.is_finite());
+        let against = value.map(|value| if found.rule.how == How::Change { value.abs() } else { value });
         let passed = match (against, threshold) {
             (_, None) => true,
             (Some(against), Some(threshold)) => against <= threshold,
-            (None, Some(_)) => undefined_alike,
+            (None, Some(_)) => found.base.is_none() && found.candidate.is_none(),
         };
         let margin = against.zip(threshold).map(|(against, threshold)| match threshold {
             _ if against <= 0.0 => 1.0,
@@ -158,74 +150,65 @@ impl Thresholds {
             0.0 => -1.0 - against,
             _ => 1.0 - against / threshold,
         });
-        let (name, waived) = (name.to_owned(), false);
         Gate {
-            name,
-            item,
-            base,
-            candidate,
+            name: found.rule.gate.clone(),
+            item: found.item,
+            base: found.base,
+            candidate: found.candidate,
             value,
-            unit,
+            unit: &found.rule.unit,
             threshold,
             margin,
-            standard_error,
+            standard_error: found.standard_error,
             passed,
-            waived,
+            waived: false,
             source,
-            explanation,
+            explanation: found.explanation,
         }
     }
 }
 
-fn parse(text: &str, place: &str) -> Result<File, ThresholdsError> {
+fn parse(text: &str, place: &str) -> Result<File, DiffError> {
     let text = text.trim_start_matches('\u{feff}');
-    crate::config::ron_options().from_str(text).map_err(|e| ThresholdsError::Invalid {
-        place: format!("{place}, line {} column {}", e.span.start.line, e.span.start.col),
-        what: match e.code {
+    crate::config::ron_options().from_str(text).map_err(|e| {
+        let what = match e.code {
             ron::Error::ExpectedNamedStructLike("File") if !text.trim().is_empty() => {
                 "the keys stand in parentheses, as in (gates: { \"leak.light\": (absolute: 0.01) })".to_owned()
             }
             _ => messages::of_file(&e, text),
-        },
+        };
+        DiffError::file(Path::new(place), format!("line {} column {}: {what}", e.span.start.line, e.span.start.col))
     })
-}
-
-fn check(limit: &Limit) -> Result<(), String> {
-    for (key, value) in [
-        ("absolute", limit.absolute),
-        ("relative", limit.relative),
-        ("standard_errors", limit.standard_errors),
-        ("other_seeds", limit.other_seeds),
-    ] {
-        if let Some(value) = value.filter(|v| !(*v >= 0.0 && v.is_finite())) {
-            return Err(format!("{key} is {value}: write a number from 0 up"));
-        }
-    }
-    Ok(())
 }
 
 /// Whether a pattern, in which `*` stands for any letters, is that of the whole text.
 fn fits(pattern: &str, text: &str) -> bool {
-    let Some((start, rest)) = pattern.split_once('*') else { return pattern == text };
-    let (middle, end) = rest.rsplit_once('*').unwrap_or(("", rest));
-    let inner = text.strip_prefix(start).and_then(|text| text.strip_suffix(end));
-    // Each part at its first place: a later one would leave less for those after it.
-    let after = |text: &str, part: &str| text.find(part).map(|at| at + part.len());
-    inner.is_some_and(|inner| {
-        middle.split('*').try_fold(inner, |text, part| Some(&text[after(text, part)?..])).is_some()
-    })
+    // The second sign stands for one letter, and no name holds it.
+    WildMatchPattern::<'*', '\0'>::new(pattern).matches(text)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
+    use serde_json::json;
+
+    use super::super::figures::Facts;
+    use super::super::rules::{findings, gates};
     use super::*;
 
     fn thresholds() -> Thresholds {
         Thresholds::load(None).unwrap()
     }
 
-    fn finding(value: Option<f64>, error: Option<f64>) -> Finding {
-        Finding::percentage("irradiance.mean", "lit/visibility_on", value, "").with_error(error)
+    fn image_mean(base: f64, candidate: f64) -> Finding {
+        let pair = Facts::of(&json!({"mean_base": base, "mean_candidate": candidate}));
+        findings("image", "lit/visibility_on", [&Facts::default(); 2], &pair, Seeds::Equal).remove(0)
+    }
+
+    /// Of a mean that changed by so many percent.
+    fn changed(percent: f64) -> Finding {
+        image_mean(100.0, 100.0 + percent)
     }
 
     #[test]
@@ -253,42 +236,53 @@ mod tests {
     #[test]
     fn the_largest_bound_holds() {
         let mut thresholds = thresholds();
-        let text = r#"(gates: {"irradiance.mean": (absolute: 0.5, relative: 0.01, standard_errors: 4)})"#;
+        let text = r#"(gates: {"image.mean": (absolute: 0.5, relative: 0.01, standard_errors: 4, other_seeds: 0.2)})"#;
         thresholds.put(text, "a.ron").unwrap();
-        let gate = thresholds.judge(finding(Some(-0.9), None));
-        assert!(gate.passed && gate.threshold == Some(1.0) && gate.source == "a.ron: gates.irradiance.mean");
-        assert!((gate.margin.unwrap() - 0.1).abs() < 1e-12);
-        assert!(!thresholds.judge(finding(Some(-1.1), Some(0.1))).passed);
-        let gate = thresholds.judge(finding(Some(-1.1), Some(0.5)));
-        assert!(gate.passed && gate.threshold == Some(2.0));
+        let gate = thresholds.judge(changed(-0.9));
+        assert!(gate.passed && gate.threshold == Some(1.0) && gate.source == "a.ron: gates.image.mean");
+        assert!((gate.margin.unwrap() - 0.1).abs() < 1e-9);
+        let with_error = |error: f64| Finding { standard_error: Some(error), ..changed(-1.1) };
+        assert!(!thresholds.judge(with_error(0.1)).passed);
+        assert_eq!(thresholds.judge(with_error(0.5)).threshold, Some(2.0));
+        // Between other seeds the measured noise, but not more than the wide bound.
+        let other = |noise| Finding { seeds: Seeds::Other, noise, ..changed(-1.1) };
+        for (noise, expected) in [(None, 20.0), (Some(0.3), 1.0), (Some(5.0), 5.0), (Some(70.0), 20.0)] {
+            assert_eq!(thresholds.judge(other(noise)).threshold, Some(expected), "{noise:?}");
+        }
     }
 
     #[test]
-    fn undefined_fails_unless_it_is_so_on_both_sides() {
-        let gate = thresholds().judge(finding(None, None));
-        assert!(gate.passed && gate.margin.is_none());
-        let one = Finding { base: Some(1.0), ..finding(None, None) };
-        assert!(!thresholds().judge(one).passed);
-        assert!(!thresholds().judge(Finding { base: Some(1.0), ..finding(Some(f64::NAN), None) }).passed);
+    fn changes_from_darkness_fail() {
+        let gate = thresholds().judge(image_mean(0.0, 1.0));
+        assert!(!gate.passed && gate.value.is_none() && gate.margin.is_none());
+        assert!(thresholds().judge(image_mean(0.0, 0.0)).passed);
+        assert!(!thresholds().judge(Finding { value: Some(f64::NAN), ..changed(0.0) }).passed);
     }
 
     #[test]
     fn costs_may_fall_and_light_may_not_change() {
-        let cost = |candidate| {
-            let sides = [Some(100.0), Some(candidate)];
-            thresholds().judge(Finding::ratio("memory.bytes_per_probe", "", sides, Direction::Increase, ""))
+        let cost = |candidate: f64| {
+            let report = |bytes: f64| Facts::of(&json!({"bytes_per_probe": {"file": bytes}}));
+            let found = findings("bake", "", [&report(100.0), &report(candidate)], &Facts::default(), Seeds::Equal);
+            thresholds().judge(found[0].clone())
         };
         assert!(cost(10.0).passed && cost(10.0).margin == Some(1.0) && !cost(200.0).passed);
-        assert!(!thresholds().judge(finding(Some(-50.0), None)).passed);
+        assert!(!thresholds().judge(changed(-50.0)).passed);
+    }
+
+    #[test]
+    fn every_gate_has_its_limit() {
+        let of_rules: BTreeSet<&str> = gates().collect();
+        assert_eq!(of_rules, thresholds().gates.keys().map(String::as_str).collect());
     }
 
     #[test]
     fn exceptions_are_for_their_items() {
         let mut thresholds = thresholds();
-        let text = r#"(exceptions: [(item: "dark/*", gate: "irradiance.*", limit: (absolute: 70))])"#;
+        let text = r#"(exceptions: [(item: "dark/*", gate: "image.*", limit: (absolute: 70))])"#;
         thresholds.put(text, "a.ron").unwrap();
-        assert!(!thresholds.judge(finding(Some(60.0), None)).passed);
-        let gate = thresholds.judge(Finding { item: "dark/visibility_on".into(), ..finding(Some(60.0), None) });
+        assert!(!thresholds.judge(changed(60.0)).passed);
+        let gate = thresholds.judge(Finding { item: "dark/visibility_on".into(), ..changed(60.0) });
         assert!(gate.passed && gate.source.starts_with("a.ron: exceptions"), "{gate:?}");
     }
 
@@ -298,6 +292,7 @@ mod tests {
             (r#"(gates: {"leak.ligth": (absolute: 1)})"#, "did you mean 'leak.light'"),
             (r#"(gates: {"leak.light": (absolut: 1)})"#, "did you mean 'absolute'"),
             (r#"(gate: {})"#, "did you mean 'gates'"),
+            (r#"(gates: {"leak.*": ()})"#, "there is no key 'leak.*'"),
             (r#"(gates: {"leak.light": (absolute: -1)})"#, "from 0 up"),
             (r#"(exceptions: [(item: "*", gate: "lek.*", limit: ())])"#, "there is no key 'lek.*'"),
             ("", "it is empty"),

@@ -16,6 +16,9 @@ Sets up, builds, and bakes each scene three times with all threads and three tim
   capture ×       rays per second of the capture with all threads ÷ with one
   bake ×          sum of the stages' times with one thread ÷ with all
 
+Then runs the benchmarks of look-ups, filter and bounces (scripts/bench/probes.rs, one thread) and prints what each look-up
+takes as a ratio to the default's, and the change of each against the run before, where there was one.
+
 Scenes: office, courtyard (sky 0.6,0.8,1.2), two_rooms_sealed, and from ../shared/scenes, where they are there,
 veach_ajar and bathroom (sky 1,1,1). Reports stay in out/bench/.
 LIGHTPROBE names a binary to use instead of building one." "$@"
@@ -97,4 +100,34 @@ rows = [head] + [row(name) for name in names]
 widths = [max(len(r[i]) for r in rows) for i in range(len(head))]
 for r in rows:
     print("  ".join(c.ljust(w) if i == 0 else c.rjust(w) for i, (c, w) in enumerate(zip(r, widths))).rstrip())
+PY
+
+# Look-ups, filter and bounces: medians in ns, and ratios within this run.
+say 'look-ups, filter, bounces'
+cargo bench --locked --quiet --bench probes -- --noplot >"$work/probes.txt" 2>&1 || die "the benchmarks failed: $work/probes.txt"
+python3 - "${CARGO_TARGET_DIR:-target}/criterion" <<'PY'
+import json, pathlib, sys
+
+folder = pathlib.Path(sys.argv[1])
+POINTS = 4096  # of scripts/bench/probes.rs
+
+
+def median(path, kind):
+    file = path / kind / "estimates.json"
+    return json.loads(file.read_text(encoding="utf-8"))["median"]["point_estimate"] if file.is_file() else None
+
+
+found = {}
+for file in sorted(folder.glob("**/new/benchmark.json")):
+    name = json.loads(file.read_text(encoding="utf-8"))["full_id"]
+    path = file.parent.parent
+    # `change` holds new ÷ old − 1.
+    found[name] = median(path, "new"), median(path, "change")
+default = found.get("query/single/default", (None, None))[0]
+for name, (ns, change) in found.items():
+    is_query = name.startswith("query/")
+    per = ns / POINTS if is_query else ns
+    against = f"{ns / default:6.2f} × the default's single look-up" if is_query and default else ""
+    before = f"{1 + change:6.3f} × the run before" if change is not None else ""
+    print(f"{name:<48} {per:12.1f} ns  {against:<42} {before}".rstrip())
 PY

@@ -13,7 +13,7 @@ use crate::scene::{Mesh, Scene};
 use crate::system::memory::{TooLittleMemory, available_bytes};
 
 /// What every probe takes besides its maps: position and state, twice, what placement found around it, and the heads of
-/// its capture, of its masks and of a sweep's result.
+/// its capture, of its masks and of an iteration's result.
 const PROBE_BYTES: u64 = size_of::<Option<ProbeCapture>>() as u64 + 160;
 
 /// A captured surface with the mask that the bounces keep of it.
@@ -29,7 +29,7 @@ pub struct Memory {
     pub survey: u64,
     /// Filters from captures to maps.
     pub kernels: u64,
-    /// Maps of irradiance and distance with their copies, and what the solver remembers of sweeps.
+    /// Maps of irradiance and distance with their copies, and what the solver remembers of iterations.
     pub maps: u64,
     /// Captures that are traced at the same time.
     pub in_flight: u64,

@@ -11,7 +11,7 @@ use super::{Console, check_picture_memory, tell, write_json};
 use crate::cli::{ReferenceArgs, TransportName};
 use crate::config::Config;
 use crate::light::World;
-use crate::light::bsdf::Transport;
+use crate::light::bsdf::ReflectionModel;
 use crate::light::path::Strategy;
 use crate::math::blocks::BLOCK;
 use crate::report::reference::{NoiseReport, Rays, ReferenceReport, ReferenceTimes, SCHEMA};
@@ -46,7 +46,7 @@ pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
     let camera =
         cameras(&args.view, &world, console)?.into_iter().next().context("there is no camera; use --look-at")?;
     let size = args.view.size;
-    let layered = settings.transport == Transport::Gltf || has_blend(&world);
+    let layered = settings.transport == ReflectionModel::Gltf || has_blend(&world);
     check_picture_memory(size, if layered { LAYERED_PIXEL_BYTES } else { PIXEL_BYTES })?;
 
     let identity = Identity::new(&world, &camera, size.width, size.height, &settings);
@@ -103,8 +103,8 @@ fn settings(args: &ReferenceArgs) -> ReferenceSettings {
         spp: args.spp,
         seed: args.trace.seed,
         transport: match args.transport {
-            TransportName::Lambert => Transport::Lambert,
-            TransportName::Gltf => Transport::Gltf,
+            TransportName::Lambert => ReflectionModel::Lambert,
+            TransportName::Gltf => ReflectionModel::Gltf,
         },
         max_bounces: args.max_bounces,
         strategy: Strategy::Mis,

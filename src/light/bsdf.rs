@@ -15,7 +15,7 @@ use crate::math::sampling::{cosine_hemisphere, cosine_hemisphere_density};
 /// The reflection model of paths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Transport {
+pub enum ReflectionModel {
     /// Every surface is Lambertian with its diffuse albedo. Probes store this light.
     #[default]
     Lambert,
@@ -47,10 +47,10 @@ impl Scattered {
 impl Bsdf {
     /// `normal` is the shading normal; `view` the unit direction towards the viewer.
     #[inline]
-    pub fn new(world: &World, point: &SurfacePoint, normal: Vec3, view: Vec3, transport: Transport) -> Bsdf {
+    pub fn new(world: &World, point: &SurfacePoint, normal: Vec3, view: Vec3, transport: ReflectionModel) -> Bsdf {
         match transport {
-            Transport::Lambert => Bsdf::Lambert { normal, albedo: point.albedo },
-            Transport::Gltf => Bsdf::Gltf(Layered::new(world, point, normal, view)),
+            ReflectionModel::Lambert => Bsdf::Lambert { normal, albedo: point.albedo },
+            ReflectionModel::Gltf => Bsdf::Gltf(Layered::new(world, point, normal, view)),
         }
     }
 

@@ -11,7 +11,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::World;
-use super::bsdf::{Bsdf, Transport};
+use super::bsdf::{Bsdf, ReflectionModel};
 use super::punctual::{Incident, incident};
 use super::sampled::RayCount;
 use super::surface::SurfacePoint;
@@ -36,7 +36,7 @@ pub enum Strategy {
 /// Settings of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PathSettings {
-    pub transport: Transport,
+    pub transport: ReflectionModel,
     pub strategy: Strategy,
     /// Most bounces, where bounces are the reflections between a light and the surface in the picture. `None` allows
     /// any number. 0 keeps only the light that arrives directly from emissive surfaces and the sky. 1 adds light that

@@ -7,7 +7,7 @@ use super::layers::{compose, to_pixels};
 use super::points::{ImagePoint, View, has_blend};
 use crate::image::LayeredImage;
 use crate::light::World;
-use crate::light::bsdf::{Bsdf, Transport};
+use crate::light::bsdf::{Bsdf, ReflectionModel};
 use crate::light::lambert::reflected_radiance;
 
 /// Names of the layers with variances.
@@ -54,20 +54,20 @@ pub(super) struct FixedView {
 pub(super) const NO_POINT: u32 = u32::MAX;
 
 /// The quantities to accumulate for this scene and transport.
-pub fn quantities(world: &World, transport: Transport) -> &'static [Quantity] {
+pub fn quantities(world: &World, transport: ReflectionModel) -> &'static [Quantity] {
     match (has_blend(world), transport) {
-        (false, Transport::Lambert) => LAMBERT,
-        (false, Transport::Gltf) => GLTF,
-        (true, Transport::Lambert) => BLENDED,
-        (true, Transport::Gltf) => BLENDED_GLTF,
+        (false, ReflectionModel::Lambert) => LAMBERT,
+        (false, ReflectionModel::Gltf) => GLTF,
+        (true, ReflectionModel::Lambert) => BLENDED,
+        (true, ReflectionModel::Gltf) => BLENDED_GLTF,
     }
 }
 
 /// Radiance that a point reflects from punctual lights, W·m⁻²·sr⁻¹.
-pub(super) fn direct_radiance(world: &World, point: &ImagePoint, transport: Transport, salt: u32) -> Vec3 {
+pub(super) fn direct_radiance(world: &World, point: &ImagePoint, transport: ReflectionModel, salt: u32) -> Vec3 {
     match transport {
-        Transport::Lambert => reflected_radiance(point.surface.albedo, point.irradiance_direct),
-        Transport::Gltf => {
+        ReflectionModel::Lambert => reflected_radiance(point.surface.albedo, point.irradiance_direct),
+        ReflectionModel::Gltf => {
             let bsdf = Bsdf::new(world, &point.surface, point.normal, point.view, transport);
             world.punctual_radiance(&point.surface, &bsdf, salt)
         }

@@ -17,7 +17,7 @@ use super::film::{Film, NoiseLevel, Quantity, add_block};
 use super::points::{ImagePoint, has_blend, see, see_pixel};
 use crate::image::LayeredImage;
 use crate::light::World;
-use crate::light::bsdf::Transport;
+use crate::light::bsdf::ReflectionModel;
 use crate::light::path::{PathSettings, Strategy};
 use crate::light::sampled::RayCount;
 use crate::math::blocks::{BLOCK, Block};
@@ -36,7 +36,7 @@ pub struct ReferenceSettings {
     /// Samples per pixel. From [`BLOCK`] on they are rounded up to whole blocks.
     pub spp: u32,
     pub seed: u64,
-    pub transport: Transport,
+    pub transport: ReflectionModel,
     /// As [`PathSettings::max_bounces`].
     pub max_bounces: Option<u32>,
     pub strategy: Strategy,
@@ -49,7 +49,7 @@ impl Default for ReferenceSettings {
         ReferenceSettings {
             spp: 256,
             seed: 0,
-            transport: Transport::default(),
+            transport: ReflectionModel::default(),
             max_bounces: None,
             strategy: Strategy::default(),
             firefly_clamp: None,

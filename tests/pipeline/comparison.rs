@@ -173,7 +173,7 @@ fn a_traced_reference_is_as_good_as_its_file() {
         let words = format!("--size 32x18 {words}");
         render(&rooms.folder, &scene("two_rooms_open"), &rooms.baked.path, name, &words)
     };
-    let traced = run("traced", "--reference 50 --threads 1");
+    let traced = run("traced", "--reference 50 --bake-error --threads 1");
     // Rounded up to whole blocks of 16.
     assert_eq!((&traced["reference"]["spp"], &traced["reference"]["file"]), (&json!(64), &Value::Null));
     assert!(number(&traced["reference"]["time_s"]) > 0.0);
@@ -186,7 +186,7 @@ fn a_traced_reference_is_as_good_as_its_file() {
         let mut leak = a["leak"].clone();
         assert!(number(&leak["baked"]) >= 0.0);
         leak["baked"] = Value::Null;
-        assert_eq!(leak, b["leak"], "only a traced reference tells what leaked into the probes");
+        assert_eq!(leak, b["leak"], "only paths tell what leaked into the probes");
         assert!(a.get("error_gltf").is_none());
         // Interpolation errs by percents, and not by more than the light that there is.
         let mean = number(&traced["reference"]["irradiance_indirect_mean"]);

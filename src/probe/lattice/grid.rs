@@ -386,7 +386,7 @@ fn cover(extent: DVec3, spacing: f64, padding: f64) -> Result<(DVec3, UVec3), Gr
     Ok((DVec3::splat(spacing), cells.as_uvec3() + UVec3::ONE))
 }
 
-/// The spacing at which so many probes cover the extent and the padding; `usual` where there is no extent.
+/// The spacing at which this many probes cover the extent and the padding; `usual` where there is no extent.
 fn spread(extent: DVec3, divisions: UVec3, padding: f64, usual: f64) -> (DVec3, UVec3) {
     let cells = (divisions - UVec3::ONE).as_dvec3();
     let room = (cells - 2.0 * padding).max(DVec3::splat(0.5));

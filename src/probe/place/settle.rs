@@ -115,7 +115,7 @@ impl Settler<'_, '_> {
         found
     }
 
-    /// Whether so many of them are backs that the position lies inside something.
+    /// Whether more than `back_face_share` of what the rays met are backs: then the position lies inside something.
     pub fn is_inside(&self, around: &Surroundings) -> bool {
         around.backs as f32 > self.settings.back_face_share * around.hits as f32
     }

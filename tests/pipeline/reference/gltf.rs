@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::{DVec3, Vec3};
-use lightprobe::light::bsdf::Transport;
+use lightprobe::light::bsdf::ReflectionModel;
 use lightprobe::light::path::Strategy;
 use lightprobe::scene::Environment;
 use lightprobe::shade::reference::{ReferenceSettings, trace};
@@ -21,7 +21,7 @@ fn material(color: [f64; 3], metallic: f64, roughness: f64) -> Value {
 }
 
 fn gltf(spp: u32, strategy: Strategy) -> ReferenceSettings {
-    ReferenceSettings { transport: Transport::Gltf, ..settings(spp, strategy) }
+    ReferenceSettings { transport: ReflectionModel::Gltf, ..settings(spp, strategy) }
 }
 
 #[test]

@@ -1,11 +1,16 @@
 //! The command line: what was typed. `commands/` turns it into what it means.
 
+mod values;
+
 use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand};
 
 use crate::scene::EnvironmentSource;
+
+pub use self::values::{LookAt, PictureSize};
+use self::values::{parse_exposure, parse_positive, parse_size};
 
 /// Bakes light-field probe volumes for global illumination and measures how much they leak, err and cost.
 #[derive(Debug, Parser)]
@@ -156,7 +161,7 @@ pub struct RenderArgs {
     /// Exposure of the PNG pictures, in powers of two; from the picture where not given.
     #[arg(long, value_name = "EV", allow_hyphen_values = true, value_parser = parse_exposure)]
     pub exposure: Option<f32>,
-    /// Path-trace a reference of every camera with so many samples per pixel, and report how far the probes are from it.
+    /// Path-trace a reference of every camera with SPP samples per pixel, and report how far the probes are from it.
     ///
     /// Rounded up to a multiple of 16; from 32 on figures have standard errors.
     #[arg(long, value_name = "SPP", allow_negative_numbers = true, conflicts_with = "reference_image", value_parser = clap::value_parser!(u32).range(1..=MAX_SPP))]
@@ -305,76 +310,6 @@ pub struct InspectArgs {
     /// Also print one probe: position, state, irradiance along the six axes.
     #[arg(long, value_name = "I", allow_negative_numbers = true)]
     pub probe: Option<u32>,
-}
-
-/// Width and height, pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PictureSize {
-    pub width: u32,
-    pub height: u32,
-}
-
-/// Largest side of a picture, pixels.
-const MAX_SIDE: u32 = 16_384;
-
-impl FromStr for PictureSize {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<PictureSize, String> {
-        let side = |s: &str| s.parse::<u32>().ok().filter(|n| (1..=MAX_SIDE).contains(n));
-        let parts = text.split_once(['x', 'X']).and_then(|(w, h)| Some((side(w)?, side(h)?)));
-        let (width, height) =
-            parts.ok_or_else(|| format!("write width and height as 640x360, each from 1 to {MAX_SIDE}"))?;
-        Ok(PictureSize { width, height })
-    }
-}
-
-/// A camera position and target in world space.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LookAt {
-    pub origin: [f64; 3],
-    pub target: [f64; 3],
-    pub fov_y_deg: f32,
-}
-
-impl FromStr for LookAt {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<LookAt, String> {
-        let form = "write six or seven numbers: ox,oy,oz,tx,ty,tz[,fov]";
-        let numbers: Option<Vec<f64>> =
-            text.split(',').map(|s| s.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
-        let numbers = numbers.ok_or(form)?;
-        let (origin, target, fov) = match numbers[..] {
-            [a, b, c, d, e, f] => ([a, b, c], [d, e, f], 60.0),
-            [a, b, c, d, e, f, fov] => ([a, b, c], [d, e, f], fov),
-            _ => return Err(form.into()),
-        };
-        if origin == target {
-            return Err("origin and target are the same point".into());
-        }
-        if !(fov > 0.0 && fov < 180.0) {
-            return Err("the field of view must lie between 0 and 180 degrees".into());
-        }
-        Ok(LookAt { origin, target, fov_y_deg: fov as f32 })
-    }
-}
-
-fn parse_exposure(text: &str) -> Result<f32, String> {
-    let ev: Option<f32> = text.parse().ok().filter(|ev: &f32| ev.abs() <= 100.0);
-    ev.ok_or_else(|| "write a number from -100 to 100".into())
-}
-
-fn parse_positive(text: &str) -> Result<f32, String> {
-    let range = f32::MIN_POSITIVE..=f32::MAX;
-    let number: Option<f32> = text.parse().ok().filter(|x| range.contains(x));
-    number.ok_or_else(|| format!("write a number from {:.1e} to {:.1e}", range.start(), range.end()))
-}
-
-fn parse_size(text: &str) -> Result<u64, String> {
-    text.parse::<bytesize::ByteSize>()
-        .map(|size| size.as_u64())
-        .map_err(|_| "write a size such as 512MiB or 2GB".into())
 }
 
 #[cfg(test)]

@@ -1,0 +1,73 @@
+//! Values that flags take, and what is said about those they do not take.
+
+use std::str::FromStr;
+
+/// Width and height, pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PictureSize {
+    pub width: u32,
+    pub height: u32,
+}
+
+/// Largest side of a picture, pixels.
+const MAX_SIDE: u32 = 16_384;
+
+impl FromStr for PictureSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<PictureSize, String> {
+        let side = |s: &str| s.parse::<u32>().ok().filter(|n| (1..=MAX_SIDE).contains(n));
+        let parts = text.split_once(['x', 'X']).and_then(|(w, h)| Some((side(w)?, side(h)?)));
+        let (width, height) =
+            parts.ok_or_else(|| format!("write width and height as 640x360, each from 1 to {MAX_SIDE}"))?;
+        Ok(PictureSize { width, height })
+    }
+}
+
+/// A camera position and target in world space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LookAt {
+    pub origin: [f64; 3],
+    pub target: [f64; 3],
+    pub fov_y_deg: f32,
+}
+
+impl FromStr for LookAt {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<LookAt, String> {
+        let form = "write six or seven numbers: ox,oy,oz,tx,ty,tz[,fov]";
+        let numbers: Option<Vec<f64>> =
+            text.split(',').map(|s| s.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
+        let numbers = numbers.ok_or(form)?;
+        let (origin, target, fov) = match numbers[..] {
+            [a, b, c, d, e, f] => ([a, b, c], [d, e, f], 60.0),
+            [a, b, c, d, e, f, fov] => ([a, b, c], [d, e, f], fov),
+            _ => return Err(form.into()),
+        };
+        if origin == target {
+            return Err("origin and target are the same point".into());
+        }
+        if !(fov > 0.0 && fov < 180.0) {
+            return Err("the field of view must lie between 0 and 180 degrees".into());
+        }
+        Ok(LookAt { origin, target, fov_y_deg: fov as f32 })
+    }
+}
+
+pub fn parse_exposure(text: &str) -> Result<f32, String> {
+    let ev: Option<f32> = text.parse().ok().filter(|ev: &f32| ev.abs() <= 100.0);
+    ev.ok_or_else(|| "write a number from -100 to 100".into())
+}
+
+pub fn parse_positive(text: &str) -> Result<f32, String> {
+    let range = f32::MIN_POSITIVE..=f32::MAX;
+    let number: Option<f32> = text.parse().ok().filter(|x| range.contains(x));
+    number.ok_or_else(|| format!("write a number from {:.1e} to {:.1e}", range.start(), range.end()))
+}
+
+pub fn parse_size(text: &str) -> Result<u64, String> {
+    text.parse::<bytesize::ByteSize>()
+        .map(|size| size.as_u64())
+        .map_err(|_| "write a size such as 512MiB or 2GB".into())
+}

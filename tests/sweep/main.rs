@@ -311,7 +311,7 @@ fn what_cannot_be_swept_is_refused_before_any_work() {
     let own = ladder_of("d.ron", "(ladders: [(name: \"x\", preset: \"default\")])");
     for (words, parts) in [
         (format!("--ladder {unknown}"), &["a.ron", "'x'", "'spacing_m'"][..]),
-        (format!("--ladder {unlike}"), &["solver.albedo_max", "0.5", "0.9", "reference"]),
+        (format!("--ladder {unlike}"), &["materials.albedo_max", "0.5", "0.9", "reference"]),
         (format!("--ladder {large}"), &["x spacing_m=0.001", "spacing_m"]),
         (format!("--ladder {own} --preset default"), &["--preset", "leave them out"]),
         ("--ladder /nowhere/a.ron".to_owned(), &["/nowhere/a.ron"]),

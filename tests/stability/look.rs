@@ -41,7 +41,8 @@ const UNASKED: [&str; 10] = [
 ];
 
 /// Ratios to the light seen: `null` where there is none.
-const OF_LIGHT: [&str; 7] = ["light", "dark", "fraction", "weight", "lookup_ns", "lookup_spread_ns", "irradiance_indirect_mean"];
+const OF_LIGHT: [&str; 7] =
+    ["light", "dark", "fraction", "weight", "lookup_ns", "lookup_spread_ns", "irradiance_indirect_mean"];
 
 /// Everything that could go wrong in a report, whatever the scene.
 fn check_report(report: &Value, lit: bool) {

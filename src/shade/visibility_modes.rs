@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::points::ImagePoint;
 use crate::light::World;
-use crate::probe::query::{BatchVisibility, Query, QueryPoint, Visibility};
+use crate::probe::query::{BatchVisibility, Query, Visibility};
 use crate::trace::Ray;
 
 /// Number of times that shading is repeated to measure its time.
@@ -90,17 +90,14 @@ pub fn exact_masks(world: &World, query: &Query, points: &[ImagePoint]) -> Vec<u
 pub fn irradiance(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<Vec3> {
     let mut out = vec![Vec3::ZERO; points.len()];
     let chunks = out.par_chunks_mut(BATCH).zip(points.par_chunks(BATCH).zip(masks.par_chunks(BATCH)));
-    chunks.for_each(|(out, (points, masks))| ask(query, points, masks, mode, out));
+    chunks.for_each(|(out, (points, masks))| {
+        query.for_each(points.iter().map(ImagePoint::query), mode.of_batch(masks), |i, irradiance| out[i] = irradiance);
+    });
     out
 }
 
 /// Points that one task asks for at a time.
-const BATCH: usize = 256;
-
-fn ask(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode, out: &mut [Vec3]) {
-    let asking: Vec<QueryPoint> = points.iter().map(ImagePoint::query).collect();
-    query.batch(&asking, mode.of_batch(masks), out);
-}
+const BATCH: usize = 512;
 
 /// Milliseconds for querying and shading all points, one entry per run.
 pub fn time_shading(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<f64> {
@@ -110,10 +107,9 @@ pub fn time_shading(query: &Query, points: &[ImagePoint], masks: &[u8], mode: Vi
             let started = Instant::now();
             let chunks = radiance.par_chunks_mut(BATCH).zip(points.par_chunks(BATCH).zip(masks.par_chunks(BATCH)));
             chunks.for_each(|(out, (points, masks))| {
-                ask(query, points, masks, mode, out);
-                for (out, point) in out.iter_mut().zip(points) {
-                    *out = super::layers::beauty(point, *out);
-                }
+                query.for_each(points.iter().map(ImagePoint::query), mode.of_batch(masks), |i, indirect| {
+                    out[i] = super::layers::beauty(&points[i], indirect);
+                });
             });
             std::hint::black_box(&radiance);
             started.elapsed().as_secs_f64() * 1e3

@@ -128,11 +128,26 @@ impl<'v> Query<'v> {
     /// When `out`, or the masks, are not as many as the points.
     pub fn batch(&self, points: &[QueryPoint], visibility: BatchVisibility, out: &mut [Vec3]) {
         assert_eq!(points.len(), out.len(), "a result for every point");
+        self.for_each(points.iter().copied(), visibility, |i, irradiance| out[i] = irradiance);
+    }
+
+    /// [`Self::batch`] for points that are made as they are asked: calls `each` with the number of every point and its
+    /// irradiance.
+    ///
+    /// # Panics
+    /// When there are fewer masks than points.
+    #[inline]
+    pub fn for_each(
+        &self,
+        points: impl ExactSizeIterator<Item = QueryPoint>,
+        visibility: BatchVisibility,
+        mut each: impl FnMut(usize, Vec3),
+    ) {
         let visibility = match visibility {
             BatchVisibility::Exact(masks) => {
-                assert_eq!(points.len(), masks.len(), "a mask for every point");
-                for ((point, &mask), out) in points.iter().zip(masks).zip(out) {
-                    *out = self.asked(point, &Mask(mask));
+                assert!(points.len() <= masks.len(), "a mask for every point");
+                for (i, (point, &mask)) in points.zip(masks).enumerate() {
+                    each(i, self.asked(&point, &Mask(mask)));
                 }
                 return;
             }
@@ -140,8 +155,8 @@ impl<'v> Query<'v> {
             BatchVisibility::Stored => Visibility::Stored,
         };
         with_test!(self, visibility, |test| {
-            for (point, out) in points.iter().zip(out) {
-                *out = self.asked(point, &test);
+            for (i, point) in points.enumerate() {
+                each(i, self.asked(&point, &test));
             }
         });
     }

@@ -232,8 +232,8 @@ impl Irradiance {
         let (resolution, border, curve) = (maps.resolution, maps.border, *curve);
         let interior = interior_texel(resolution, border);
         let set = |(probe, map): (usize, &mut [Vec3A])| {
-            let before: Vec<Vec3A> = (0..resolution * resolution).map(|o| curve.decode(map[interior(o)])).collect();
-            let (mut values, result) = values(probe, &mut before.into_iter())?;
+            let mut before = (0..resolution * resolution).map(|o| curve.decode(map[interior(o)]));
+            let (mut values, result) = values(probe, &mut before)?;
             values.iter_mut().for_each(|e| *e = curve.encode(*e));
             fill_with_border(&values, resolution, border, map);
             Some(result)

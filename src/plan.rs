@@ -57,7 +57,7 @@ impl Plan {
         Plan { lines, visibility }
     }
 
-    /// Adds the line about bounces, known only afterwards: `done` of them in `bounces_s` seconds.
+    /// Adds the line about bounces, known only afterwards: `done` iterations in `bounces_s` seconds.
     pub fn add_bounces(&mut self, done: u32, transport: &Transport, converged: bool, bounces_s: f64) {
         let limit = transport.iteration().max_bounces;
         let saved = limit.map_or(0, |most| most.saturating_sub(done));
@@ -65,8 +65,8 @@ impl Plan {
         let reason = match limit {
             _ if transport.is_complete() => "every captured hit holds all light already".to_owned(),
             _ if converged => format!("{done} iterations; what further bounces would add is below the tolerance"),
-            Some(most) if most == done => format!("all {most} bounces; the tolerance was not reached"),
-            _ => format!("all {done} iterations; the tolerance was not reached"),
+            Some(most) => format!("all {most} bounces that were asked for; the tolerance was not reached"),
+            None => format!("all {done} iterations; the tolerance was not reached"),
         };
         let saved_s = (converged && saved > 0).then_some(per_bounce * f64::from(saved));
         self.lines.push(Line { stage: "bounces", kept: !converged, reason, saved_bytes: None, saved_s });

@@ -33,11 +33,24 @@ class Probes:
             self.meta = file.metadata()
             self.tensors = {name: file.get_tensor(name) for name in file.keys()}
         assert self.meta["format"] == "lightprobe/1", self.meta["format"]
+        if "query" in self.meta:  # older files say it in their configuration
+            self.check_weights(json.loads(self.meta["query"])["weights"])
         grid = json.loads(self.meta["grid"])
         self.origin, self.spacing = np.array(grid["origin"]), np.array(grid["spacing"])
         self.divisions, self.border = np.array(grid["divisions"]), grid["border"]
         self.cells = np.maximum(self.divisions - 1, 1)
         self.maps = self.unpack_irradiance()
+
+    @staticmethod
+    def check_weights(weights):
+        """Refuses files that are asked in another way than this script asks."""
+        plain = {"direction": "uniform", "blend": "linear", "trilinear_floor": 0.0, "weight_floor": 0.0}
+        plain |= {"crush_below": 0.0, "normal_bias": 0.0, "view_bias": 0.0}
+        other = [key for key, value in plain.items() if weights[key] != value]
+        if weights["test"] not in ("none", {"table": {"reach_voxels": 3, "strip": 0.25}}):
+            other.append("test")
+        if other:
+            sys.exit(f"this script has the weights of the preset default only; the file differs in {', '.join(other)}")
 
     def unpack_irradiance(self):
         """[P, R', R', 3], in the domain of `encoding.irradiance`, in which maps are filtered."""

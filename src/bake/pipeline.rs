@@ -55,7 +55,7 @@ impl Prepared<'_, '_> {
         let mut volume = self.volume(asked);
         let solution = self.transport(&captures, &mut volume, circumstances, scene, &mut log)?;
         let mut plan = self.plan.clone();
-        let done = solution.bounces.len().saturating_sub(1) as u32;
+        let done = solution.bounces.len() as u32;
         plan.add_bounces(done, &config.transport, solution.converged, log.times.bounces);
         if let Some(unasked) = unasked {
             volume.occlusion = unasked;

@@ -105,7 +105,7 @@ pub struct ViewArgs {
     /// Camera by origin and target, metres in world space, and vertical field of view in degrees (60 where not given).
     #[arg(long, value_name = "ox,oy,oz,tx,ty,tz[,fov]", value_parser = LookAt::from_str, allow_hyphen_values = true)]
     pub look_at: Option<LookAt>,
-    /// PictureSize of the pictures in pixels.
+    /// Size of the pictures in pixels.
     #[arg(long, value_name = "WxH", default_value = "640x360", value_parser = PictureSize::from_str, allow_hyphen_values = true)]
     pub size: PictureSize,
 }
@@ -171,8 +171,8 @@ pub struct RenderArgs {
     pub reference_image: Option<PathBuf>,
     /// Also light the probes themselves by full paths, and report how far the file's are from that.
     ///
-    /// Takes longer than all else. With --reference the paths are in proportion to its samples per pixel, and the pictures
-    /// gain an entry with the path-traced probes: what it still errs is interpolation.
+    /// Takes longer than all else; with --reference the paths are in proportion to its samples per pixel. The report gains an
+    /// entry with the path-traced probes under exact visibility: what it still errs is interpolation.
     #[arg(long)]
     pub bake_error: bool,
     /// Render although the scene has changed since the bake.
@@ -250,7 +250,7 @@ pub struct SweepArgs {
     /// Ladders: which keys of the configurations take which values.
     #[arg(long, value_name = "FILE.ron")]
     pub ladder: Option<PathBuf>,
-    /// Override one key of all configurations; may be repeated. The values of a ladder go before it.
+    /// Override one key of all configurations; may be repeated. An axis of the ladder with the same key wins.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
     /// Compare on equal grids (all methods take bounds and spacing of the first) or at equal bytes.

@@ -6,11 +6,11 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use glam::DVec3;
 
-use super::session::{Opening, Session, resolve_config};
+use super::session::{Opening, Session, list_presets, lists_presets, resolve_config};
 use super::{Console, tell, write_json};
 use crate::bake::{Baked, Checkpoint, Circumstances, Prepared, prepare};
 use crate::cli::BakeArgs;
-use crate::config::{Config, presets};
+use crate::config::Config;
 use crate::plan::Line;
 use crate::probe::lattice::ProbeState;
 use crate::probe::transport::checkpoint;
@@ -22,7 +22,7 @@ use crate::system::memory::peak_memory_bytes;
 use crate::system::output::Named;
 
 pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
-    if args.config.preset.as_deref() == Some("list") {
+    if lists_presets(&args.config.preset) {
         return list_presets(console);
     }
     let config = resolve_config(&args.config, &args.trace)?;
@@ -61,7 +61,7 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
         write_json(path, &report)?;
         tell::written(console, path);
     }
-    session.print(&report, || summary(&report, output))
+    session.print(&report, || summary(&report, &config, output))
 }
 
 fn opening<'a>(args: &'a BakeArgs, config: &Config) -> Result<Opening<'a>> {
@@ -108,11 +108,6 @@ fn outputs(args: &BakeArgs) -> Result<Vec<Named>> {
     let report = args.report.as_ref().map(|report| Named::new("--report", report));
     let checkpoint = Named::new("the file that --resume reads", checkpoint::path_for(output));
     Ok([Named::new("-o", output), checkpoint].into_iter().chain(report).collect())
-}
-
-fn list_presets(console: &Console) -> Result<()> {
-    let lines: Vec<String> = presets::PRESETS.iter().map(|p| format!("{:<20} {}", p.name, p.summary)).collect();
-    console.print(&lines.join("\n"))
 }
 
 /// Probes away from the scene can be meant, for a plain below them; more often a unit or an axis is wrong.
@@ -243,7 +238,7 @@ fn warn_about(report: &BakeReport, config: &Config, console: &Console) {
     }
 }
 
-fn summary(report: &BakeReport, output: &Path) -> String {
+fn summary(report: &BakeReport, config: &Config, output: &Path) -> String {
     let t = &report.time_s;
     let mut table = Table::new(&[("bake", Column::Text), ("", Column::Number)]);
     let rate =
@@ -252,7 +247,7 @@ fn summary(report: &BakeReport, output: &Path) -> String {
         ("probes (active)", format!("{} ({})", report.probes, report.probes_active)),
         ("rays", format!("{} M", format::significant((report.rays.primary + report.rays.shadow) as f64 / 1e6, 3))),
         ("ray rate", rate(report.rays_per_s)),
-        ("bounces", bounces(report)),
+        ("bounces", bounces(report, config)),
         ("load and build", format::seconds(t.load + t.accel_build)),
         ("survey", format::seconds(t.survey)),
         ("capture", format::seconds(t.capture)),
@@ -274,9 +269,10 @@ fn summary(report: &BakeReport, output: &Path) -> String {
 }
 
 /// How many there are, and by how many iterations where these are combined.
-fn bounces(report: &BakeReport) -> String {
+fn bounces(report: &BakeReport, config: &Config) -> String {
     let iterations = report.bounces.len();
     match report.solver.accelerated {
+        _ if config.transport.is_complete() => "all, by paths".to_owned(),
         0 => report.bounces.last().map_or(0, |bounce| bounce.index).to_string(),
         _ => format!("all, by {iterations} iterations"),
     }

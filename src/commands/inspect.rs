@@ -103,7 +103,8 @@ fn to_text(file: &ProbeFile, probe: Option<u32>) -> String {
          grid      uniform, {} × {} × {} probes, spacing {} m, origin {} m, border {}\n\
          probes    {} ({active} active, {inside} inside geometry, {unsampled} never sampled)\n\
          irradiance {}\n\
-         occlusion  {}\n",
+         occlusion  {}\n\
+         query      {}\n",
         format::bytes(file.file_bytes),
         file.scene.name,
         file.scene.blake3,
@@ -117,6 +118,7 @@ fn to_text(file: &ProbeFile, probe: Option<u32>) -> String {
         volume.states.len(),
         volume.irradiance.describe(),
         volume.occlusion.describe(),
+        serde_json::to_string(&file.query.weights).unwrap_or_default(),
     );
     let mut table = Table::new(&[
         ("tensor", Column::Text),

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 
 use super::camera::cameras;
-use super::session::{Opening, Session, resolve_config};
+use super::session::{Opening, Session, list_presets, lists_presets, resolve_config};
 use super::{Console, check_picture_memory, tell, write_json};
 use crate::cli::{ReferenceArgs, TransportName};
 use crate::config::Config;
@@ -34,6 +34,9 @@ pub(super) const PIXEL_BYTES: f64 = 850.0;
 pub(super) const LAYERED_PIXEL_BYTES: f64 = 2000.0;
 
 pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
+    if lists_presets(&args.config.preset) {
+        return list_presets(console);
+    }
     if args.view.camera.as_deref() == Some("all") {
         bail!("--camera all: a reference is one picture; name one camera");
     }

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::{Console, tell};
 use crate::cli::{ConfigArgs, TraceArgs};
-use crate::config::{Config, Layers};
+use crate::config::{Config, Layers, presets};
 use crate::light::World;
 use crate::probe::file::{LightRecord, SceneRecord};
 use crate::report::header::Header;
@@ -124,6 +124,17 @@ pub fn inputs(scene: &Path, trace: &TraceArgs, others: impl IntoIterator<Item = 
     }
     inputs.extend(others);
     inputs
+}
+
+/// Whether the presets are asked for, and not one of them.
+pub fn lists_presets<'n>(names: impl IntoIterator<Item = &'n String>) -> bool {
+    names.into_iter().any(|name| name == "list")
+}
+
+/// Prints the presets.
+pub fn list_presets(console: &Console) -> Result<()> {
+    let lines: Vec<String> = presets::PRESETS.iter().map(|p| format!("{:<20} {}", p.name, p.summary)).collect();
+    console.print(&lines.join("\n"))
 }
 
 /// Defaults, then preset, then file, then `--set`, then a constant `--env`, which a probe file so carries to `render`.

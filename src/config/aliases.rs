@@ -32,6 +32,17 @@ pub fn is_old_section(path: &str) -> bool {
     matches!(path, "filter" | "encoding" | "solver")
 }
 
+/// What an old key takes whose values have other names now; `None` for other keys.
+pub fn values(path: &str) -> Option<&'static str> {
+    Some(match path {
+        "capture.reflected" => {
+            "through_probes, or path_traced(paths: 16); today: transport=bounces() or paths(paths: 16)"
+        }
+        "query.visibility" => "none, moments(power: 3, floor: 0.05) or surface(voxels_per_cell: 8)",
+        _ => return None,
+    })
+}
+
 /// What an old key and its value are now, in the order in which they are set; `None` for keys of today.
 pub fn today(path: &str, value: &str) -> Option<Vec<(String, String)>> {
     if let Some((_, now)) = RENAMED.iter().find(|(old, _)| *old == path) {

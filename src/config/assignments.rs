@@ -126,6 +126,12 @@ pub fn of_text(text: &str, place: &str) -> Result<Vec<Assignment>, ConfigError> 
             }
         }
     }
+    for (i, later) in assignments.iter().enumerate() {
+        if assignments[..i].iter().any(|earlier| earlier.path == later.path) {
+            let what = format!("{} is given twice; remove one", later.path);
+            return Err(ConfigError::Invalid { place: later.place.clone(), what });
+        }
+    }
     Ok(assignments)
 }
 

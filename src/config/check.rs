@@ -61,7 +61,12 @@ impl Config {
         self.query.check(&mut rule);
         for stage in &self.plan.keep {
             let known = STAGES.contains(&stage.as_str());
-            rule("plan.keep", stage.clone(), known, "use names of stages as `bake --dry-run` prints them");
+            rule(
+                "plan.keep",
+                stage.clone(),
+                known,
+                "use punctual_shadow_rays, emissive_surfaces, sky, alpha_test, textures, radiance_levels, unused_probes or visibility",
+            );
         }
         first_error
     }

@@ -76,10 +76,7 @@ impl Layers {
             tree.apply(assignment, &mut waiting)?;
         }
         for assignment in &waiting {
-            // What is still not there had no effect before either.
-            if tree.at(&assignment.path).is_some() {
-                tree.apply(assignment, &mut Vec::new())?;
-            }
+            tree.apply_late(assignment)?;
         }
         let place = self.assignments.last().map_or("the configuration", |a| &a.place);
         let invalid = |place: &str, what: String| Err(ConfigError::Invalid { place: place.to_owned(), what });
@@ -91,8 +88,9 @@ impl Layers {
             let what = format!("grid.{key} is given too; remove one, or put --set grid.{key}=None before");
             return invalid(last.map_or(place, |a| &a.place), what);
         }
+        let decides = |a: &&Assignment| ["store", "query"].iter().any(|section| a.path.starts_with(section));
         match config.query.mismatch(&config.store.occlusion) {
-            Some(what) => invalid(place, what),
+            Some(what) => invalid(self.assignments.iter().rfind(decides).map_or(place, |a| &a.place), what),
             None => Ok(config),
         }
     }
@@ -163,9 +161,50 @@ impl Tree {
         self.set(assignment)
     }
 
+    /// An old key of a choice that no assignment has taken. Whole files of before name keys of all choices, and those had
+    /// no effect: they are only held against their range. A `--set` is meant.
+    fn apply_late(&mut self, assignment: &Assignment) -> Result<(), ConfigError> {
+        if self.at(&assignment.path).is_some() {
+            return self.apply(assignment, &mut Vec::new());
+        }
+        if assignment.place.starts_with("--set") {
+            return self.set(assignment);
+        }
+        let mut scratch = Tree::new(&self.config);
+        if let Some((parent, choice)) = self.missing_choice(&assignment.path) {
+            let taken = Assignment { path: parent, value: format!("{choice}()"), ..assignment.clone() };
+            scratch.set(&taken)?;
+        }
+        scratch.set(assignment)
+    }
+
+    /// Where a path leaves the tree: the key that holds another choice, and the choice that the path asks for.
+    fn missing_choice(&self, path: &str) -> Option<(String, String)> {
+        let keys: Vec<&str> = path.split('.').collect();
+        let at = (1..keys.len()).find(|&i| self.at(&keys[..=i].join(".")).is_none())?;
+        Some((keys[..at].join("."), keys[at].to_owned()))
+    }
+
     fn set(&mut self, Assignment { place, path, value }: &Assignment) -> Result<(), ConfigError> {
         let error = |what: String| ConfigError::Invalid { place: place.clone(), what };
-        let alone = alone(path, value);
+        let mut alone = alone(path, value);
+        // `bounces` means `bounces()`, and `grid_points()` means `grid_points`.
+        if let (Err(_), Some((name, "" | "()"))) = (&alone, choice(value)) {
+            let other = if value.ends_with(')') { name.to_owned() } else { format!("{name}()") };
+            alone = self::alone(path, &other).or(alone);
+        }
+        if self.at(path).is_none()
+            && alone.is_ok()
+            && let Some((parent, choice)) = self.missing_choice(path)
+        {
+            let taken = self.at(&parent).map(name_of).unwrap_or_default();
+            return Err(error(format!("{parent} is {taken}, so '{path}' has no effect; write {parent}={choice}(...)")));
+        }
+        if self.at(path).is_none()
+            && let Some(values) = aliases::values(path)
+        {
+            return Err(error(format!("{path} takes {values}")));
+        }
         if let Ok(alone) = &alone {
             // Before JSON makes `null` of NaN and infinities, and so the default of a key that may be left out.
             alone.check(place)?;
@@ -181,16 +220,29 @@ impl Tree {
     }
 }
 
+/// The name of a choice, with its settings or without.
+fn name_of(choice: &Value) -> String {
+    let with_settings = choice.as_object().and_then(|map| map.keys().next());
+    with_settings.map(String::as_str).or(choice.as_str()).unwrap_or("something else").to_owned()
+}
+
 /// What is wrong with a value: RON knows it better where it is about names.
 fn explain(error: &serde_json::Error, alone: Option<&SpannedError>, value: &str) -> String {
-    if let Some(message) = messages::without_parameters(value) {
+    let is_about_names = matches!(
+        alone.map(|e| &e.code),
+        Some(ron::Error::NoSuchEnumVariant { .. } | ron::Error::NoSuchStructField { .. })
+    );
+    if !is_about_names
+        && let Some((name, _)) = choice(value)
+        && let Some(message) = messages::without_parameters(name)
+    {
         return message;
     }
     match alone.map(|e| &e.code) {
         Some(code @ (ron::Error::NoSuchEnumVariant { .. } | ron::Error::NoSuchStructField { .. })) => {
             messages::of_value(code, value)
         }
-        _ => error.to_string(),
+        _ => messages::in_plain_words(&error.to_string()),
     }
 }
 

@@ -47,6 +47,26 @@ pub fn without_parameters(value: &str) -> Option<String> {
     Some(format!("'{name}' needs its parameters: write it as {form}"))
 }
 
+/// Serde's words for a value of another kind, without the names of types.
+pub fn in_plain_words(message: &str) -> String {
+    let Some((found, expected)) =
+        message.strip_prefix("invalid type: ").and_then(|rest| rest.split_once(", expected "))
+    else {
+        return message.to_owned();
+    };
+    let expected = match expected {
+        "f32" | "f64" => "a number, such as 0.5",
+        "u32" | "usize" => "a whole number, such as 8",
+        "a sequence" => "a list of texts, such as [\"visibility\"]",
+        "a tuple of size 3" => "three numbers, such as (8, 4, 8)",
+        "a boolean" => "true or false",
+        other if other.starts_with("struct ") => "keys in parentheses, such as (key: value)",
+        other => other,
+    };
+    let found = found.split_once(' ').map_or(found, |(_, value)| value);
+    format!("{found} does not fit: write {expected}")
+}
+
 /// Message for a key that does not exist.
 pub fn unknown_key<'k>(found: &str, known: impl Iterator<Item = &'k str> + Clone) -> String {
     let names: Vec<&str> = known.clone().collect();

@@ -115,7 +115,6 @@ fn old_keys_of_distance_maps_wait_for_their_choice() {
     for order in [["filter.distance_resolution=6", visibility], [visibility, "filter.distance_resolution=6"]] {
         assert_eq!(with(&order).unwrap().store.occlusion, moments(6));
     }
-    assert_eq!(with(&["filter.distance_resolution=6"]).unwrap(), Config::default());
     let whole = "(filter: (irradiance_resolution: 6, distance_resolution: 7), query: (visibility: moments(power: 1, \
                  floor: 0.0), blend: linear), solver: (max_bounces: Some(2)), plan: leave_out)";
     let config = Config::parse(whole, "old.ron").unwrap();
@@ -230,4 +229,49 @@ fn files_that_say_nothing_and_marks_before_them() {
 #[test]
 fn options_need_no_some() {
     assert_eq!(Config::parse("(grid: (spacing_m: 0.5))", "a.ron").unwrap().grid.spacing_m, Some(0.5));
+}
+
+#[test]
+fn keys_of_choices_that_are_not_taken_are_refused() {
+    for (assignments, words) in [
+        (&["transport.paths.paths=4"][..], &["transport is bounces", "transport=paths(...)"][..]),
+        (&["transport=paths(paths: 2)", "transport.bounces.max_bounces=3"], &["transport is paths"]),
+        (&["transport=paths(paths: 2)", "solver.max_bounces=3"], &["transport is paths", "--set solver.max_bounces=3"]),
+        (&["placement.rule=grid_points", "placement.rays=8"], &["placement.rule is grid_points"]),
+        (&["filter.distance_resolution=8"], &["store.occlusion is surface"]),
+        (&["query.visibility=foo"], &["query.visibility takes none, moments"]),
+        (&["transport=paths()"], &["paths(paths: 16)"]),
+        (&["query.test=chebyshev(power: 3)"], &["chebyshev(power: 3, floor: 0.05)"]),
+        (&["grid.divisions=(4,4)"], &["three numbers"]),
+        (&["grid=1"], &["keys in parentheses"]),
+        (&["plan.keep=[visibility]"], &["list of texts"]),
+    ] {
+        let error = with(assignments).map(|c| c.to_ron()).unwrap_err().to_string();
+        assert!(words.iter().all(|word| error.contains(word)), "{assignments:?}: {error}");
+    }
+    // Whole files of before hold keys of all choices; their ranges still count.
+    let file = |value: &str| Config::parse(&format!("(filter: (distance_resolution: {value}))"), "old.ron");
+    assert_eq!(file("8").unwrap(), Config::default());
+    assert!(file("-8").is_err() && file("hello").is_err());
+}
+
+#[test]
+fn choices_need_no_empty_parentheses() {
+    for (bare, written) in [
+        ("transport=bounces", "transport=bounces()"),
+        ("query.test=table", "query.test=table()"),
+        ("store.occlusion=surface", "store.occlusion=surface()"),
+        ("placement.rule=grid_points()", "placement.rule=grid_points"),
+    ] {
+        assert_eq!(with(&[bare]).unwrap(), with(&[written]).unwrap(), "{bare}");
+    }
+}
+
+#[test]
+fn messages_name_the_place_that_decides() {
+    let layers = Layers::default().text("(query: (\n  test: none))", "a.ron").unwrap();
+    let error = layers.set(&["grid.spacing_m=2".to_owned()]).unwrap().config().unwrap_err().to_string();
+    assert!(error.contains("a.ron, line 2") && !error.contains("--set"), "{error}");
+    let twice = Config::parse("(grid: (spacing_m: 2.0,\n spacing_m: 1.0))", "a.ron").unwrap_err().to_string();
+    assert!(twice.contains("a.ron, line 2") && twice.contains("twice"), "{twice}");
 }

@@ -239,12 +239,21 @@ fn rungs(name: &str, base: &Layers, axes: &[Axis], finish: &dyn Fn(&mut Config))
     let rung = |(axes, layers): (Vec<(String, String)>, Layers)| {
         let mut config = layers.config()?;
         finish(&mut config);
-        let short = |key: &str| key.rsplit('.').next().unwrap_or(key).to_owned();
-        let parts: Vec<String> = axes.iter().map(|(key, value)| format!("{}={value}", short(key))).collect();
+        let parts: Vec<String> = axes.iter().map(|(key, value)| format!("{}={value}", short(key, &axes))).collect();
         let label = if parts.is_empty() { name.to_owned() } else { format!("{name} {}", parts.join(" ")) };
         Ok(Rung { label, axes, config })
     };
     found.into_iter().map(rung).collect()
+}
+
+/// The end of a key that tells it from the other axes.
+fn short<'k>(key: &'k str, axes: &[(String, String)]) -> &'k str {
+    let ends = key.rmatch_indices('.').map(|(dot, _)| &key[dot + 1..]).chain([key]);
+    let is_alone = |end: &&str| {
+        let dotted = format!(".{end}");
+        axes.iter().filter(|(other, _)| other == end || other.ends_with(&dotted)).count() == 1
+    };
+    ends.into_iter().find(is_alone).unwrap_or(key)
 }
 
 /// Refuses ladders that cannot share a reference: its light and its albedos are those of the scene.

@@ -48,7 +48,8 @@ pub fn table(report: &RenderReport) -> String {
         report.exposure_ev,
         format::percent(report.methods.first().map_or(0.0, |m| m.leak.unseen)),
     );
-    for line in error_lines(report, mean) {
+    let baked = report.baked.as_ref().filter(|b| b.figures.bias.is_some()).map(baked_line);
+    for line in error_lines(report, mean).into_iter().chain(baked) {
         text.push('\n');
         text.push_str(&line);
     }
@@ -113,7 +114,6 @@ fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {
         lines.push(format!("  {name} ({share} of the picture's surfaces): {}", figures.join(", ")));
     }
     lines.extend(verdicts(&errors));
-    lines.extend(report.baked.as_ref().filter(|b| b.figures.bias.is_some()).map(baked_line));
     lines
 }
 

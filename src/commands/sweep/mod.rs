@@ -14,7 +14,7 @@ use anyhow::{Context, Result, bail};
 use self::methods::{check_all, check_captures, configurations, ladders, shared};
 use self::work::Work;
 use super::camera::cameras;
-use super::session::{Opening, Session};
+use super::session::{Opening, Session, list_presets, lists_presets};
 use super::{Console, check_picture_memory, tell};
 use crate::cli::SweepArgs;
 use crate::evaluate::{Comparison, Scenery};
@@ -31,6 +31,9 @@ use crate::system::output::{Named, check_folder, create_folder};
 const PIXEL_BYTES: f64 = 1500.0;
 
 pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
+    if lists_presets(&args.preset) {
+        return list_presets(console);
+    }
     if args.view.camera.as_deref() == Some("all") {
         bail!("--camera all: a sweep is of one camera; name one");
     }

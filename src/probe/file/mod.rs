@@ -113,8 +113,9 @@ fn decode(container: &Container, file_bytes: u64) -> Result<ProbeFile, String> {
     let spacing = Vec3::from(record.spacing);
     let grid = Grid::from_parts(DVec3::from(record.origin), spacing, UVec3::from(record.divisions))
         .ok_or_else(|| format!("metadata 'grid' makes no grid: {:?} probes at spacing {spacing}", record.divisions))?;
-    if record.border > 1 {
-        return Err(format!("metadata 'grid' has the unknown border {}", record.border));
+    if record.border > 1 || record.levels > 0 {
+        let (border, levels) = (record.border, record.levels);
+        return Err(format!("metadata 'grid' has the unknown border {border} or levels {levels}"));
     }
     let probes = grid.probe_count();
     let positions = container.tensor("position", &[Dtype::F32], &[Some(probes), Some(3)])?.f32s();
@@ -133,14 +134,16 @@ fn decode(container: &Container, file_bytes: u64) -> Result<ProbeFile, String> {
         positions,
     };
     let config = container.text("config")?.clone();
+    let query: QueryRecord = match container.metadata.contains_key("query") {
+        true => container.json("query")?,
+        false => legacy::query(&config)?,
+    };
+    query.check(&volume_in_grid.occlusion)?;
     let shape =
         |(name, t): (&String, &super::container::Tensor)| (name.clone(), (t.dtype.to_string(), t.shape.clone()));
     Ok(ProbeFile {
         volume_in_grid,
-        query: match container.metadata.contains_key("query") {
-            true => container.json("query")?,
-            false => legacy::query(&config)?,
-        },
+        query,
         border: record.border,
         config,
         scene: container.json("scene")?,

@@ -5,6 +5,7 @@ use serde_json::Value;
 
 use crate::probe::container::Container;
 use crate::probe::query::QuerySettings;
+use crate::probe::store::Occlusion;
 
 /// The metadata key `grid`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -58,6 +59,29 @@ pub struct LightRecord {
     pub sky: Option<(f32, f32, f32)>,
     /// Albedos are clamped to this.
     pub albedo_max: f32,
+}
+
+impl QueryRecord {
+    /// Refuses weights that no configuration could have asked for, and a test that the file's tensors do not fit.
+    ///
+    /// # Errors
+    /// The key and what is wrong with it.
+    pub fn check(&self, occlusion: &Occlusion) -> Result<(), String> {
+        let mut first = Ok(());
+        self.weights.check(&mut |key, value, holds, rule| {
+            if !holds && first.is_ok() {
+                first = Err(format!("metadata 'query': {key} is {value}: {rule}"));
+            }
+        });
+        // What the plan left out is not asked.
+        if let Some(test) = occlusion.test()
+            && test != self.weights.test.name()
+        {
+            first = first
+                .and(Err(format!("metadata 'query': the test {} does not fit the tensors", self.weights.test.name())));
+        }
+        first
+    }
 }
 
 /// The version of a file's `query` where it is newer than this program.

@@ -262,6 +262,15 @@ impl Occlusion {
         Some((squares / a.len() as f64).sqrt())
     }
 
+    /// Name of the visibility test that can ask it; `None` where there is nothing to ask.
+    pub fn test(&self) -> Option<&'static str> {
+        match self {
+            Occlusion::None => None,
+            Occlusion::Moments(_) => Some("chebyshev"),
+            Occlusion::Surface(_) => Some("table"),
+        }
+    }
+
     /// How much it can tell, for comparisons: 0 nothing, 1 distances, 2 visibility at surfaces.
     pub fn rank(&self) -> u32 {
         match self {

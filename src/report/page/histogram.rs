@@ -1,6 +1,8 @@
 //! Histograms of signed differences, counts on a logarithmic axis, so that one bad pixel in two million is a bar.
 //! `assets/page/macros.html` draws them.
 
+use minijinja::Value;
+use minijinja::value::Serde;
 use serde::Serialize;
 
 use crate::report::ticks::signed_labels;
@@ -14,7 +16,7 @@ const FOOT: f64 = 0.3;
 
 /// Values counted over ±a range, as the drawing needs them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Counts {
+struct Counts {
     title: String,
     /// The same in words.
     summary: String,
@@ -28,8 +30,13 @@ pub struct Counts {
     labels: [String; 5],
 }
 
-/// Counts values over ±`range` > 0, in `unit`; what lies beyond counts in the bars at the ends. `what` is counted, such as "pixels".
-pub fn count(title: &str, values: &[f32], range: f64, unit: &str, what: &str) -> Counts {
+/// Counts values over ±`range` > 0, in `unit`, for the template; what lies beyond counts in the bars at the ends. `what` is counted,
+/// such as "pixels".
+pub fn histogram(title: &str, values: &[f32], range: f32, unit: &str, what: &str) -> Value {
+    Value::from(Serde(count(title, values, f64::from(range), unit, what)))
+}
+
+fn count(title: &str, values: &[f32], range: f64, unit: &str, what: &str) -> Counts {
     let (mut bars, mut beyond, mut undefined) = ([0_u64; BARS], 0, 0);
     for value in values {
         let share = 0.5 * (f64::from(*value) / range + 1.0);

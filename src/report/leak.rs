@@ -112,7 +112,6 @@ pub fn measure(
         fraction: ratio(from_hidden, from_all),
         weight: ratio(hidden_weight, seen),
         unseen: ratio(unseen, seen + unseen).unwrap_or(0.0),
-        dark_region: None,
-        baked: None,
+        ..Leak::default()
     }
 }

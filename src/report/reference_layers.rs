@@ -102,6 +102,11 @@ impl ReferenceLayers {
         let error = self.noise.as_ref().and_then(|noise| mean(&|i| noise.luminance_variance(i).sqrt()));
         (light, error)
     }
+
+    /// Whether the reference says something usable about a pixel.
+    pub fn is_finite(&self, pixel: usize) -> bool {
+        self.irradiance[pixel].is_finite() && self.noise.as_ref().is_none_or(|n| n.is_finite(pixel))
+    }
 }
 
 impl ReferenceNoise {
@@ -134,12 +139,5 @@ impl ReferenceNoise {
     fn is_finite(&self, pixel: usize) -> bool {
         let known = self.covariance.as_ref().is_none_or(|c| c[pixel].is_finite());
         known && self.variance[pixel].is_finite()
-    }
-}
-
-impl ReferenceLayers {
-    /// Whether the reference says something usable about a pixel.
-    pub fn is_finite(&self, pixel: usize) -> bool {
-        self.irradiance[pixel].is_finite() && self.noise.as_ref().is_none_or(|n| n.is_finite(pixel))
     }
 }

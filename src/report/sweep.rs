@@ -57,20 +57,20 @@ pub struct LadderReport {
     pub method: String,
     pub configurations: Vec<usize>,
     /// What of its own nothing beats.
-    pub fronts: Fronts,
+    pub fronts: PerFront<Vec<usize>>,
     /// The configuration of least error.
     pub best: Option<usize>,
     /// Smallest `bias_relative` of its configurations that bias rules.
     pub floor_relative: Option<f64>,
 }
 
-/// Front of error against each cost, and of leaks against bytes.
-#[derive(Debug, Clone, Default, Serialize)]
-pub struct Fronts {
-    pub bake_s: Vec<usize>,
-    pub bytes: Vec<usize>,
-    pub shade_ms: Vec<usize>,
-    pub leak_light: Vec<usize>,
+/// Of the front of error against each cost, and of that of leaks against bytes.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct PerFront<T> {
+    pub bake_s: T,
+    pub bytes: T,
+    pub shade_ms: T,
+    pub leak_light: T,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -93,7 +93,7 @@ pub struct ConfigurationReport {
     /// "noise" or "bias".
     pub ruled_by: Option<&'static str>,
     /// Whether nothing beats it in the whole sweep.
-    pub on_front: OnFront,
+    pub on_front: PerFront<bool>,
     pub runs: Vec<RunRecord>,
 }
 
@@ -101,14 +101,6 @@ pub struct ConfigurationReport {
 pub struct AxisValue {
     pub key: String,
     pub value: String,
-}
-
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct OnFront {
-    pub bake_s: bool,
-    pub bytes: bool,
-    pub shade_ms: bool,
-    pub leak_light: bool,
 }
 
 /// A figure over the seeds; all `null` where it is undefined with any of them.

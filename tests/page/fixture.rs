@@ -10,7 +10,8 @@ use lightprobe::report::diff::probes::{ProbeRow, ProbesReport};
 use lightprobe::report::diff::shown::{self, Shown};
 use lightprobe::report::diff::{DiffReport, SideReport, Verdict};
 use lightprobe::report::gate::{Gate, sort};
-use lightprobe::report::page::{Command, ConfigChange, Plot};
+use lightprobe::report::page::{Command, ConfigChange};
+use minijinja::context;
 use serde_json::json;
 
 /// Breaks out of attributes, elements, scripts and comments, and turns the text after it around.
@@ -165,11 +166,10 @@ fn page_of(mut images: Vec<Layer>) -> String {
         layer.difference = pixels.map(|(base, candidate)| luminance(*candidate - *base)).collect();
         shown::image(layer, pairs).unwrap()
     });
-    let plots = vec![Plot {
-        title: "Error against time".to_owned(),
-        svg: "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 400 200\"><script>window.boom=2</script>\
-              <image href=\"http://example.org/x.png\"/><path d=\"M20 20 L380 180\" stroke=\"#06c\"/></svg>"
-            .to_owned(),
+    let plots = vec![context! {
+        title => "Error against time",
+        svg => "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 400 200\"><script>window.boom=2</script>\
+              <image href=\"http://example.org/x.png\"/><path d=\"M20 20 L380 180\" stroke=\"#06c\"/></svg>",
     }];
     shown::page(&report, Shown { images: packed.collect(), plots }).unwrap()
 }

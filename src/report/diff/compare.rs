@@ -56,21 +56,12 @@ pub fn compare(request: &Request, mut on_item: impl FnMut(&str)) -> Result<Compa
     // All that headers and reports tell is said before the work.
     let shown_pairs = Some(check(&pairs, request.mask)?);
     let mut compared = Compared { shown_pairs, ..Compared::default() };
-    let (base, candidate) = (side_report(&sides[0]), side_report(&sides[1]));
-    let thresholds = request.thresholds.clone();
-    let config_changes = config_changes([base.config.as_deref(), candidate.config.as_deref()]);
-    let (added, missing, version) = (pairs.added, pairs.missing, env!("CARGO_PKG_VERSION"));
-    compared.report = DiffReport {
-        schema: SCHEMA,
-        version,
-        base,
-        candidate,
-        added,
-        missing,
-        config_changes,
-        thresholds,
-        ..Default::default()
-    };
+    let report = &mut compared.report;
+    (report.schema, report.version) = (SCHEMA, env!("CARGO_PKG_VERSION"));
+    (report.base, report.candidate) = (side_report(&sides[0]), side_report(&sides[1]));
+    report.config_changes = config_changes([report.base.config.as_deref(), report.candidate.config.as_deref()]);
+    (report.added, report.missing) = (pairs.added, pairs.missing);
+    report.thresholds = request.thresholds.clone();
     let mut all = Vec::new();
     for Paired { name, bases, candidate } in &pairs.both {
         on_item(name);

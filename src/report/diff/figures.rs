@@ -124,11 +124,6 @@ impl Seeds {
     }
 }
 
-/// A number at a place such as "figures.leak_light.mean".
-pub fn number(value: &Value, place: &str) -> Option<f64> {
-    place.split('.').try_fold(value, |value, key| value.get(key))?.as_f64()
-}
-
 /// Name of a part of an item.
 pub fn join(item: &str, part: &str) -> String {
     join_by(item, part, '/')

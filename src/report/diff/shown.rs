@@ -8,7 +8,7 @@ use super::images::Layer;
 use super::probes::ProbesReport;
 use super::report::DiffReport;
 use crate::report::heatmap::range_of;
-use crate::report::page::{self, PackedImage, PageError, PairPixels, Plot, histogram};
+use crate::report::page::{self, PackedImage, PageError, PairPixels, histogram};
 
 /// Name, place and unit of figures that the page lists. `{}` stands for the unit of the pixels, for which there is no room in every
 /// column.
@@ -42,7 +42,7 @@ const OF_PROBES: &[[&str; 3]] = &[
 pub struct Shown {
     /// In the order of the report's images.
     pub images: Vec<PackedImage>,
-    pub plots: Vec<Plot>,
+    pub plots: Vec<Value>,
 }
 
 /// The page as HTML.
@@ -51,7 +51,7 @@ pub struct Shown {
 /// Those of [`page::render`].
 pub fn page(report: &DiffReport, shown: Shown) -> Result<String, PageError> {
     let probes: Vec<Value> = report.probes.iter().map(probes).collect();
-    let view = context! { probes, plots => Serde(shown.plots), ..Value::from(Serde(report)) };
+    let view = context! { probes, plots => shown.plots, ..Value::from(Serde(report)) };
     page::render(view, &report.gates, shown.images)
 }
 

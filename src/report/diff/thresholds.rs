@@ -45,22 +45,18 @@ pub struct Exception {
     pub limit: Limit,
 }
 
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+/// The thresholds in effect, or those of a file.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-struct File {
-    gates: BTreeMap<String, Limit>,
-    exceptions: Vec<Exception>,
-}
-
-/// The thresholds in effect.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Thresholds {
     pub gates: BTreeMap<String, Limit>,
     /// The last that fits holds.
     pub exceptions: Vec<Exception>,
     /// Where each gate's limit comes from, where that is not the default.
+    #[serde(skip_deserializing)]
     sources: BTreeMap<String, String>,
     /// What exceptions come from.
+    #[serde(skip_deserializing)]
     file: Option<String>,
 }
 
@@ -70,8 +66,7 @@ impl Thresholds {
     /// # Errors
     /// A file that cannot be read, and what is no threshold in it.
     pub fn load(path: Option<&Path>) -> Result<Thresholds, DiffError> {
-        let File { gates, exceptions } = parse(DEFAULTS, "configs/diff.ron")?;
-        let mut thresholds = Thresholds { gates, exceptions, sources: BTreeMap::new(), file: None };
+        let mut thresholds = parse(DEFAULTS, "configs/diff.ron")?;
         if let Some(path) = path {
             let text = read_file(path).and_then(|bytes| String::from_utf8(bytes).map_err(std::io::Error::other));
             let remedy = "give the path of a RON file such as configs/diff.ron";
@@ -168,11 +163,11 @@ impl Thresholds {
     }
 }
 
-fn parse(text: &str, place: &str) -> Result<File, DiffError> {
+fn parse(text: &str, place: &str) -> Result<Thresholds, DiffError> {
     let text = text.trim_start_matches('\u{feff}');
     crate::config::ron_options().from_str(text).map_err(|e| {
         let what = match e.code {
-            ron::Error::ExpectedNamedStructLike("File") if !text.trim().is_empty() => {
+            ron::Error::ExpectedNamedStructLike("Thresholds") if !text.trim().is_empty() => {
                 "the keys stand in parentheses, as in (gates: { \"leak.light\": (absolute: 0.01) })".to_owned()
             }
             _ => messages::of_file(&e, text),

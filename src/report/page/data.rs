@@ -48,13 +48,6 @@ pub struct ConfigChange {
     pub candidate: Option<String>,
 }
 
-/// A drawing, shown as a picture: whatever it holds, it cannot run or load anything.
-#[derive(Debug, Clone, Serialize)]
-pub struct Plot {
-    pub title: String,
-    pub svg: String,
-}
-
 /// The page could not be made.
 #[derive(Debug, Error)]
 pub enum PageError {

@@ -18,7 +18,7 @@ mod visible;
 use minijinja::{Value, context};
 
 pub use codes::{code_of_radiance, radiance_of_code};
-pub use data::{Command, ConfigChange, PageError, PairPixels, Plot};
+pub use data::{Command, ConfigChange, PageError, PairPixels};
 pub use embed::MOST_PIXELS;
 pub use histogram::histogram;
 pub use images::PackedImage;
@@ -36,7 +36,8 @@ const SCRIPTS: [&str; 3] = [
 /// What stands for the nonce until it is known. Never in a page that is handed out.
 const NO_NONCE: &str = "0";
 
-/// The page as HTML. `report`: of the comparison, as its JSON has it, with `plots`, and with `figures` and `histograms` of its probes.
+/// The page as HTML. `report`: of the comparison, as its JSON has it, with `plots` (each a
+/// `title` and an `svg`, shown as a picture: whatever it holds, it cannot run or load anything), and with `figures` and `histograms` of its probes.
 ///
 /// # Errors
 /// None in practice: the templates are part of the program.

@@ -11,7 +11,7 @@ use crate::report::diff::mask::Mask;
 use crate::report::diff::shown;
 use crate::report::diff::thresholds::Thresholds;
 use crate::report::diff::{Compared, DiffReport, Request, compare, junit, markdown};
-use crate::report::header::command_line_but;
+use crate::report::header::command_line;
 use crate::report::table::{Column, Table};
 use crate::report::words::{in_unit, margin, of_side, outcome, value};
 use crate::system::output::{self, Named, check_folder, check_outputs, create_folder, write_atomically};
@@ -39,7 +39,7 @@ pub fn run(args: &DiffArgs, console: &Console) -> Result<Outcome> {
         allow_scene_change: args.allow_scene_change,
         mask: mask.as_ref(),
         // After an update it would be another comparison.
-        command_line: command_line_but(|word| word != "--update-baseline"),
+        command_line: command_line(|word| word != "--update-baseline"),
     };
     let mut compared =
         compare(&request, |item| console.say(format!("comparing {}", if item.is_empty() { "the two" } else { item })))?;

@@ -95,7 +95,7 @@ pub fn compare(request: &Request, mut on_item: impl FnMut(&str)) -> Result<Compa
 }
 
 fn judge(request: &Request, all: Vec<Finding>, report: &DiffReport) -> Vec<Gate> {
-    let scene_changed = all.iter().any(|finding| finding.rule.gate == "scene" && finding.value == Some(1.0));
+    let scene_changed = all.iter().any(|finding| finding.gate.name == "scene" && finding.gate.value == Some(1.0));
     let mut gates: Vec<Gate> = all.into_iter().map(|finding| request.thresholds.judge(finding)).collect();
     for gate in &mut gates {
         if request.allow_scene_change && scene_changed && OF_THE_SCENE.contains(&gate.name.as_str()) && !gate.passed {

@@ -107,18 +107,12 @@ pub enum Seeds {
 impl Seeds {
     /// All seeds that went into both sides count: a render's own is that of its lamps' samples, its probes have that of their bake.
     pub fn of(sides: [&Facts; 2]) -> Seeds {
-        let is_render = sides.iter().any(|side| side.text("command") == Some("render"));
-        let is_sweep = sides.iter().all(|side| side.get("seeds").is_some());
-        let keys: &[&str] = match (is_render, is_sweep) {
-            (true, _) => &["seed", "bake_seed"],
-            (_, true) => &["seeds"],
-            _ => &["seed"],
-        };
-        let equal = |key: &&str| sides[0].get(key).zip(sides[1].get(key)).map(|(base, candidate)| base == candidate);
-        let equal: Vec<Option<bool>> = keys.iter().map(equal).collect();
+        let is_told = |key: &&str| sides.iter().any(|side| side.0.contains_key(*key));
+        let equal = |key: &str| sides[0].get(key).zip(sides[1].get(key)).map(|(base, candidate)| base == candidate);
+        let equal: Vec<Option<bool>> = ["seed", "bake_seed", "seeds"].into_iter().filter(is_told).map(equal).collect();
         match equal {
             _ if equal.contains(&Some(false)) => Seeds::Other,
-            _ if equal.contains(&None) => Seeds::Unknown,
+            _ if equal.is_empty() || equal.contains(&None) => Seeds::Unknown,
             _ => Seeds::Equal,
         }
     }

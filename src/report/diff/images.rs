@@ -97,12 +97,6 @@ pub struct Layer {
     pub difference: Vec<f32>,
 }
 
-impl Pair<'_> {
-    fn counts(&self, pixel: usize) -> bool {
-        self.mask.is_none_or(|mask| mask.counts[pixel])
-    }
-}
-
 /// Refuses pictures that cannot be compared, by their headers. `kept`: bytes that pairs before this one leave in memory; returned
 /// with this one's added.
 ///
@@ -161,7 +155,7 @@ fn read(path: &Path, layer: &str) -> Result<(Picture, bool), DiffError> {
 fn compare_layer(pair: &Pair, layer: &str, is_named: bool) -> Result<Layer, DiffError> {
     let (base, candidate) = rayon::join(|| read(&pair.base, layer), || read(&pair.candidate, layer));
     let ((base, is_display), (candidate, _)) = (base?, candidate?);
-    let all = || (0..base.pixels.len()).filter(|i| pair.counts(*i));
+    let all = || (0..base.pixels.len()).filter(|i| pair.mask.is_none_or(|mask| mask.counts[*i]));
     let non_finite = |picture: &Picture| all().filter(|i| !picture.pixels[*i].is_finite()).count();
     let [non_finite_base, non_finite_candidate] = [non_finite(&base), non_finite(&candidate)];
     let mut used = vec![false; base.pixels.len()];
@@ -294,7 +288,9 @@ pub fn surfaces(pair: &Pair) -> Result<Option<f64>, DiffError> {
             (b[i] - c[i]).abs().max_element() > most * scale
         })
     };
-    let counted: Vec<usize> = (0..base.width as usize * base.height as usize).filter(|i| pair.counts(*i)).collect();
+    let counted: Vec<usize> = (0..base.width as usize * base.height as usize)
+        .filter(|i| pair.mask.is_none_or(|mask| mask.counts[*i]))
+        .collect();
     let different = counted.par_iter().filter(|i| differs(**i)).count();
     Ok(Some(100.0 * different as f64 / counted.len().max(1) as f64))
 }

@@ -111,15 +111,15 @@ pub fn flip_map(reference: &Picture8, shown: &Picture8) -> Vec<f32> {
 /// Means of a map over the parts of [`Flips`].
 fn part_means(map: &[f32], regions: &[Option<Region>]) -> [Option<f64>; 3] {
     assert_eq!(map.len(), regions.len(), "pixels of the regions");
-    let mean = |shown: &dyn Fn(Option<Region>) -> bool| {
-        let (mut sum, mut count) = (0.0, 0.0f64);
-        for (value, _) in map.iter().zip(regions).filter(|(_, region)| shown(**region)) {
-            sum += f64::from(*value);
-            count += 1.0;
+    let mut sums = [(0.0, 0.0f64); 3];
+    for (value, region) in map.iter().zip(regions) {
+        let part = region.map(|region| if region == Region::Corner { 1 } else { 2 });
+        for part in std::iter::once(0).chain(part) {
+            sums[part].0 += f64::from(*value);
+            sums[part].1 += 1.0;
         }
-        (count > 0.0).then(|| sum / count)
-    };
-    [mean(&|_| true), mean(&|r| r == Some(Region::Corner)), mean(&|r| r == Some(Region::Flat))]
+    }
+    sums.map(|(sum, count)| (count > 0.0).then(|| sum / count))
 }
 
 /// The picture plus normal noise of this variance. All channels of a pixel deviate by the same number of standard

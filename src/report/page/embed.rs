@@ -51,7 +51,7 @@ impl Embedded {
             vec![values.into_par_iter().map(|value| code_of_difference(f64::from(value), scale)).collect()]
         };
         let width = size.width as usize;
-        let relative = relative(&candidate, &base);
+        let relative: Vec<Vec<i16>> = candidate.iter().zip(&base).map(|(plane, from)| minus(plane, from)).collect();
         let (of_relative, of_absolute) = rayon::join(|| cost(&relative, width), || cost(&candidate, width));
         let is_candidate_relative = of_relative < of_absolute;
         let candidate = if is_candidate_relative { relative } else { candidate };
@@ -73,26 +73,19 @@ impl Embedded {
 fn planes_of(pixels: &[Vec3], code: fn(f32) -> i16) -> Vec<Vec<i16>> {
     let channel = |c: usize| -> Vec<i16> { pixels.par_iter().map(|pixel| code(pixel[c])).collect() };
     let [red, green, blue] = [0, 1, 2].map(channel);
-    let minus_green =
-        |plane: Vec<i16>| -> Vec<i16> { plane.iter().zip(&green).map(|(c, g)| c.wrapping_sub(*g)).collect() };
-    let (red, blue) = (minus_green(red), minus_green(blue));
+    let (red, blue) = (minus(&red, &green), minus(&blue, &green));
     vec![green, red, blue]
 }
 
-/// Planes as differences from other ones.
-fn relative(planes: &[Vec<i16>], from: &[Vec<i16>]) -> Vec<Vec<i16>> {
-    let minus =
-        |(plane, from): (&Vec<i16>, &Vec<i16>)| plane.iter().zip(from).map(|(a, b)| a.wrapping_sub(*b)).collect();
-    planes.iter().zip(from).map(minus).collect()
+/// A plane as differences from another one.
+fn minus(plane: &[i16], from: &[i16]) -> Vec<i16> {
+    plane.iter().zip(from).map(|(a, b)| a.wrapping_sub(*b)).collect()
 }
 
 /// The smallest power of two that leaves few enough pixels for a browser.
 pub fn finest_factor(size: PixelExtent) -> u32 {
-    let mut factor = 1;
-    while size.shrunk(factor).pixels() > MOST_PIXELS {
-        factor *= 2;
-    }
-    factor
+    let mut factors = (0..31).map(|power| 1 << power);
+    factors.find(|factor| size.shrunk(*factor).pixels() <= MOST_PIXELS).unwrap_or(1 << 31)
 }
 
 #[cfg(test)]

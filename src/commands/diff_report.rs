@@ -83,12 +83,12 @@ fn check_paths(args: &DiffArgs) -> Result<()> {
 }
 
 fn write(args: &DiffArgs, compared: &mut Compared) -> Result<()> {
-    let parts = std::mem::take(&mut compared.shown);
+    let (images, plots) = (std::mem::take(&mut compared.images), std::mem::take(&mut compared.plots));
     let report = &compared.report;
     // All texts are made before the first file is written.
     let markdown = markdown::text(report)?;
     let junit = junit::text(report).context("cannot write the gates as JUnit XML")?;
-    let page = shown::page(report, parts)?;
+    let page = shown::page(report, images, plots)?;
     create_folder(&args.output)?;
     for (name, picture) in &compared.pictures {
         picture.write_png(&args.output.join(name))?;

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::terms::fold;
 use crate::math::color::luminance;
+use crate::math::statistics::Moments;
 use crate::probe::Volume;
 use crate::probe::transport::truth::Truth;
 
@@ -41,11 +42,8 @@ pub fn measure(volume: &Volume, truth: &Truth) -> (BakedFigures, BakedFigures) {
     let left_out: Vec<BakedFigures> = (0..runs).map(|run| figures(volume, truth, Some(run))).collect();
     // Efron's jackknife: (n − 1)/n · Σ(θ₋ᵢ − mean)².
     let error = |of: fn(&BakedFigures) -> Option<f64>| {
-        let values: Option<Vec<f64>> = left_out.iter().map(of).collect();
-        let values = values?;
-        let mean = values.iter().sum::<f64>() / runs as f64;
-        let sum: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
-        Some((sum * (runs - 1) as f64 / runs as f64).sqrt())
+        let moments: Moments = left_out.iter().map(of).collect::<Option<_>>()?;
+        Some((moments.variance() * (runs - 1) as f64).sqrt())
     };
     (all, BakedFigures { bias: error(|f| f.bias), light: error(|f| f.light), dark: error(|f| f.dark) })
 }

@@ -119,14 +119,9 @@ impl ReferenceNoise {
         }
         // At most what full correlation gives: files may say anything.
         let most = (variance(a) * variance(b)).sqrt();
-        match &self.covariance {
-            // Red–green, green–blue, blue–red by the channel that the pair starts with.
-            Some(covariance) => {
-                let first = if (a + 1) % 3 == b { a } else { b };
-                f64::from(covariance[pixel][first]).clamp(-most, most)
-            }
-            None => most,
-        }
+        // Red–green, green–blue, blue–red by the channel that the pair starts with.
+        let first = if (a + 1) % 3 == b { a } else { b };
+        self.covariance.as_ref().map_or(most, |covariance| f64::from(covariance[pixel][first]).clamp(-most, most))
     }
 
     /// Variance of the pixel's luminance.

@@ -10,6 +10,7 @@ use super::header::Header;
 use super::leak::Leak;
 use super::render::ReferenceSummary;
 use crate::bake::figures::Rays;
+use crate::math::statistics::Moments;
 
 /// Version of the report's layout.
 pub const SCHEMA: &str = "lightprobe-sweep/1";
@@ -117,14 +118,12 @@ impl Aggregate {
     pub fn of(values: &[Option<f64>]) -> Aggregate {
         let values: Option<Vec<f64>> = values.iter().map(|v| v.filter(|v| v.is_finite())).collect();
         let Some(values) = values.filter(|v| !v.is_empty()) else { return Aggregate::default() };
-        let n = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let scatter: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
+        let moments: Moments = values.iter().copied().collect();
         Aggregate {
-            mean: Some(mean),
+            mean: Some(moments.mean()),
             min: values.iter().copied().reduce(f64::min),
             max: values.iter().copied().reduce(f64::max),
-            standard_error: (values.len() > 1).then(|| (scatter / (n * (n - 1.0))).sqrt()),
+            standard_error: (values.len() > 1).then(|| (moments.variance() / (moments.weight() - 1.0)).sqrt()),
         }
     }
 }

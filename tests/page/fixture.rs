@@ -7,7 +7,7 @@ use lightprobe::probe::lattice::ProbeState;
 use lightprobe::report::diff::figures::Figure;
 use lightprobe::report::diff::images::{ImageReport, Layer};
 use lightprobe::report::diff::probes::{ProbeRow, ProbesReport};
-use lightprobe::report::diff::shown::{self, Shown};
+use lightprobe::report::diff::shown;
 use lightprobe::report::diff::{DiffReport, SideReport, Verdict};
 use lightprobe::report::gate::{Gate, sort};
 use lightprobe::report::page::{Command, ConfigChange};
@@ -171,7 +171,7 @@ fn page_of(mut images: Vec<Layer>) -> String {
         svg => "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 400 200\"><script>window.boom=2</script>\
               <image href=\"http://example.org/x.png\"/><path d=\"M20 20 L380 180\" stroke=\"#06c\"/></svg>",
     }];
-    shown::page(&report, Shown { images: packed.collect(), plots }).unwrap()
+    shown::page(&report, packed.collect(), plots).unwrap()
 }
 
 /// Three pairs: light with a pixel that is no number, a hostile name, a PNG.

@@ -13,13 +13,13 @@ use super::pairs::{Paired, check, pair_up, pictures};
 use super::probes;
 use super::report::{DiffReport, SCHEMA, SideReport, Verdict};
 use super::rules::{Finding, findings};
-use super::shown::{self, Shown};
+use super::shown;
 use super::sides::{Item, Kind, Side};
 use super::sweep_plot;
 use super::thresholds::{Exception, Thresholds};
 use crate::image::Picture8;
 use crate::report::gate::{self, Gate};
-use crate::report::page::Command;
+use crate::report::page::{Command, PackedImage};
 
 /// Gates that a scene which is allowed to change does not fail by that alone.
 const OF_THE_SCENE: &[&str] = &["scene", "image.surface"];
@@ -40,7 +40,9 @@ pub struct Request<'a> {
 #[derive(Debug, Default)]
 pub struct Compared {
     pub report: DiffReport,
-    pub shown: Shown,
+    /// Of the page.
+    pub images: Vec<PackedImage>,
+    pub plots: Vec<minijinja::Value>,
     pub pictures: Vec<(String, Picture8)>,
     /// How many pairs of pictures the page shows, at most; `None`: nothing is shown.
     shown_pairs: Option<usize>,
@@ -176,7 +178,7 @@ impl Compared {
             let [base, candidate] = sides.map(Facts::configurations);
             self.report.missing.extend(base.difference(&candidate).map(|label| join(name, label)));
             self.report.added.extend(candidate.difference(&base).map(|label| join(name, label)));
-            self.shown.plots.extend(sweep_plot::plot(name, &a.report, &b.report));
+            self.plots.extend(sweep_plot::plot(name, &a.report, &b.report));
         }
         for pair in pictures(name, [a, b], mask) {
             match (pair.base.is_file(), pair.candidate.is_file()) {
@@ -198,7 +200,7 @@ impl Compared {
                 all.extend(findings("image", &layer.report.item, none, &Facts::of(&layer.report.figures), pair.seeds));
             }
             if let Some(pairs) = self.shown_pairs {
-                self.shown.images.push(shown::image(&layer, pairs)?);
+                self.images.push(shown::image(&layer, pairs)?);
                 let name = self.free_name(&layer.report.item);
                 self.pictures.push((name.clone(), layer.difference_map()));
                 layer.report.difference_map = Some(name);

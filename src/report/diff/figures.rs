@@ -105,7 +105,8 @@ pub enum Seeds {
 }
 
 impl Seeds {
-    /// All seeds that went into both sides count: a render's own is that of its lamps' samples, its probes have that of their bake.
+    /// All seeds that went into both sides count: a render's own is that of its lamps' samples, its probes have that of their bake; a
+    /// sweep has several.
     pub fn of(sides: [&Facts; 2]) -> Seeds {
         let is_told = |key: &&str| sides.iter().any(|side| side.0.contains_key(*key));
         let equal = |key: &str| sides[0].get(key).zip(sides[1].get(key)).map(|(base, candidate)| base == candidate);

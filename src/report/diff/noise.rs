@@ -27,26 +27,20 @@ pub fn measure(findings: &mut [Finding], between: &[Vec<Finding>]) {
         };
         let Some(mut sample) = sample else { continue };
         if found.rule.how != How::Pair {
-            let mean = moments(&sample).mean();
+            let mean = sample.iter().copied().collect::<Moments>().mean();
             let values: Option<Vec<f64>> = sample.iter().map(|value| found.rule.how.value(mean, *value)).collect();
             let Some(values) = values else { continue };
             sample = values;
             found.gate.base = Some(mean);
             found.gate.value = found.gate.candidate.and_then(|candidate| found.rule.how.value(mean, candidate));
         }
-        let (moments, n) = (moments(&sample), sample.len() as f64);
+        let (moments, n) = (sample.iter().copied().collect::<Moments>(), sample.len() as f64);
         if n >= 2.0 {
             found.noise = (found.rule.how == How::Pair).then(|| moments.mean());
             found.gate.standard_error = Some((moments.variance() * n / (n - 1.0) * (1.0 + 1.0 / n)).sqrt());
             found.freedom = Some(n - 1.0);
         }
     }
-}
-
-fn moments(sample: &[f64]) -> Moments {
-    let mut moments = Moments::default();
-    sample.iter().for_each(|value| moments.add(*value, 1.0));
-    moments
 }
 
 /// Turns measured spreads into bounds at [`SIGNIFICANCE`], by Student's t.

@@ -162,8 +162,6 @@ pub fn compare(item: &str, base: &Path, candidate: &Path) -> Result<ProbesReport
     let lit = rows.iter().filter(|r| r.irradiance_base > floor);
     let distances: Vec<f32> = rows.iter().filter_map(|r| r.distance_difference_m).map(|d| d as f32).collect();
     let distance = root_mean_square(distances.iter().map(|d| f64::from(*d))) / f64::from(spacing);
-    let [region_percent, region_base, region_candidate] =
-        [0, 1, 2].map(|i| region.as_ref().map(|(_, figures)| figures[i]));
     let figures = json!({
         "probes_base": base.states.len(),
         "probes_candidate": candidate.states.len(),
@@ -185,10 +183,10 @@ pub fn compare(item: &str, base: &Path, candidate: &Path) -> Result<ProbesReport
         // Root mean square of `distance_difference_m` ÷ spacing.
         "distance_percent": (!distances.is_empty()).then_some(100.0 * distance),
         // The region that changed most; no percentage where its base is dark.
-        "region_place_m": region.as_ref().map(|(place_m, _)| place_m),
-        "region_base": region_base,
-        "region_candidate": region_candidate,
-        "region_percent": region_percent,
+        "region_place_m": region.map(|(place_m, _)| place_m),
+        "region_base": region.map(|(_, figures)| figures[1]),
+        "region_candidate": region.map(|(_, figures)| figures[2]),
+        "region_percent": region.map(|(_, figures)| figures[0]),
     });
     Ok(ProbesReport {
         item: item.to_owned(),

@@ -37,22 +37,14 @@ const OF_PROBES: &[[&str; 3]] = &[
     ["compared: active on both sides", "compared", ""],
 ];
 
-/// A comparison's parts that only the page shows.
-#[derive(Debug, Default)]
-pub struct Shown {
-    /// In the order of the report's images.
-    pub images: Vec<PackedImage>,
-    pub plots: Vec<Value>,
-}
-
-/// The page as HTML.
+/// The page as HTML. `images` are in the order of the report's; `plots` are those of sweeps.
 ///
 /// # Errors
 /// Those of [`page::render`].
-pub fn page(report: &DiffReport, shown: Shown) -> Result<String, PageError> {
+pub fn page(report: &DiffReport, images: Vec<PackedImage>, plots: Vec<Value>) -> Result<String, PageError> {
     let probes: Vec<Value> = report.probes.iter().map(probes).collect();
-    let view = context! { probes, plots => shown.plots, ..Value::from(Serde(report)) };
-    page::render(view, &report.gates, shown.images)
+    let view = context! { probes, plots, ..Value::from(Serde(report)) };
+    page::render(view, &report.gates, images)
 }
 
 /// One pair of pictures of at most `pairs`.

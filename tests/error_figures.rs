@@ -294,7 +294,7 @@ fn flip_takes_the_references_noise_away() {
     let shown = [Some(Region::Flat); PIXELS];
     let of = |reference: &ReferenceLayers, method: &[Vec3]| {
         let beauty = layers(method, None, None, None).beauty;
-        measure_flip(reference, &beauty, EXPOSURE_EV, &shown, 7).parts[0]
+        measure_flip(reference, &beauty, EXPOSURE_EV, &shown, 7)[0]
     };
     for (difference, floor) in [(0.5, 0.05), (0.0, 0.0)] {
         let pair = Pair::new(|x, y| if x * y > 0.0 { difference } else { 0.0 });

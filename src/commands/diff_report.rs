@@ -8,11 +8,10 @@ use anyhow::{Context, Result, bail};
 use super::{Console, Outcome, write_json};
 use crate::cli::DiffArgs;
 use crate::report::diff::mask::Mask;
-use crate::report::diff::shown::page as page_of;
+use crate::report::diff::shown;
 use crate::report::diff::thresholds::Thresholds;
 use crate::report::diff::{Compared, DiffReport, Request, compare, junit, markdown};
-use crate::report::header::command_line_but;
-use crate::report::page;
+use crate::report::header::command_line;
 use crate::report::table::{Column, Table};
 use crate::report::words::{in_unit, margin, of_side, outcome, value};
 use crate::system::output::{self, Named, check_folder, check_outputs, create_folder, write_atomically};
@@ -40,7 +39,7 @@ pub fn run(args: &DiffArgs, console: &Console) -> Result<Outcome> {
         allow_scene_change: args.allow_scene_change,
         mask: mask.as_ref(),
         // After an update it would be another comparison.
-        command_line: command_line_but(|word| word != "--update-baseline"),
+        command_line: command_line(|word| word != "--update-baseline"),
     };
     let mut compared =
         compare(&request, |item| console.say(format!("comparing {}", if item.is_empty() { "the two" } else { item })))?;
@@ -84,12 +83,12 @@ fn check_paths(args: &DiffArgs) -> Result<()> {
 }
 
 fn write(args: &DiffArgs, compared: &mut Compared) -> Result<()> {
-    let shown = std::mem::take(&mut compared.shown);
+    let (images, plots) = (std::mem::take(&mut compared.images), std::mem::take(&mut compared.plots));
     let report = &compared.report;
     // All texts are made before the first file is written.
     let markdown = markdown::text(report)?;
     let junit = junit::text(report).context("cannot write the gates as JUnit XML")?;
-    let page = page::render(page_of(report, shown))?;
+    let page = shown::page(report, images, plots)?;
     create_folder(&args.output)?;
     for (name, picture) in &compared.pictures {
         picture.write_png(&args.output.join(name))?;

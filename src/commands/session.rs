@@ -11,7 +11,7 @@ use crate::cli::{ConfigArgs, TraceArgs};
 use crate::config::{Config, Layers, presets};
 use crate::light::World;
 use crate::probe::file::{LightRecord, SceneRecord};
-use crate::report::header::Header;
+use crate::report::header::{Header, command_line};
 use crate::scene::{self, EnvironmentSource, LoadOptions, Scene};
 use crate::system::output::{Named, check_apart, check_outputs};
 
@@ -94,7 +94,9 @@ impl<'c> Session<'c> {
 
     /// What a report begins with; `config` is the configuration in effect, RON.
     pub fn header(&self, schema: &'static str, command: &'static str, config: String) -> Header {
-        Header::new(schema, command, self.seed, self.threads, &self.scene.blake3, config)
+        let (version, command_line) = (env!("CARGO_PKG_VERSION"), command_line(|_| true));
+        let (seed, threads, scene_blake3) = (self.seed, self.threads, self.scene.blake3.clone());
+        Header { schema, version, command, command_line, seed, threads, scene_blake3, config }
     }
 
     /// Prints a report as JSON where that was asked for, else what `text` makes of it.

@@ -51,6 +51,15 @@ impl Moments {
     }
 }
 
+/// Of values of weight 1.
+impl FromIterator<f64> for Moments {
+    fn from_iter<I: IntoIterator<Item = f64>>(values: I) -> Moments {
+        let mut moments = Moments::default();
+        values.into_iter().for_each(|value| moments.add(value, 1.0));
+        moments
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

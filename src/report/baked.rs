@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::terms::fold;
 use crate::math::color::luminance;
+use crate::math::statistics::Moments;
 use crate::probe::Volume;
 use crate::probe::transport::truth::Truth;
 
@@ -33,15 +34,6 @@ pub struct BakedReport {
     pub time_s: f64,
 }
 
-/// The sums in the definitions of [`BakedFigures`].
-#[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    difference: f64,
-    over: f64,
-    under: f64,
-    truth: f64,
-}
-
 /// Compares `volume` with the path-traced truth at its probes. Returns the figures and their standard errors. Noise of
 /// the truth would raise `light` and `dark`; this is corrected to first order ([`fold`]).
 pub fn measure(volume: &Volume, truth: &Truth) -> (BakedFigures, BakedFigures) {
@@ -50,11 +42,8 @@ pub fn measure(volume: &Volume, truth: &Truth) -> (BakedFigures, BakedFigures) {
     let left_out: Vec<BakedFigures> = (0..runs).map(|run| figures(volume, truth, Some(run))).collect();
     // Efron's jackknife: (n − 1)/n · Σ(θ₋ᵢ − mean)².
     let error = |of: fn(&BakedFigures) -> Option<f64>| {
-        let values: Option<Vec<f64>> = left_out.iter().map(of).collect();
-        let values = values?;
-        let mean = values.iter().sum::<f64>() / runs as f64;
-        let sum: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
-        Some((sum * (runs - 1) as f64 / runs as f64).sqrt())
+        let moments: Moments = left_out.iter().map(of).collect::<Option<_>>()?;
+        Some((moments.variance() * (runs - 1) as f64).sqrt())
     };
     (all, BakedFigures { bias: error(|f| f.bias), light: error(|f| f.light), dark: error(|f| f.dark) })
 }
@@ -64,7 +53,7 @@ fn figures(volume: &Volume, truth: &Truth, without: Option<usize>) -> BakedFigur
     let axes = volume.irradiance.axes();
     let used: Vec<usize> = (0..truth.runs.len()).filter(|&run| Some(run) != without).collect();
     let n = used.len() as f64;
-    let mut sums = Sums::default();
+    let (mut difference, mut over, mut under, mut total) = (0.0, 0.0f64, 0.0f64, 0.0);
     for p in 0..volume.states.len() {
         let texels = truth.runs[0][p].len();
         // Per texel: solid angle, difference, variance of the truth's mean.
@@ -75,17 +64,17 @@ fn figures(volume: &Volume, truth: &Truth, without: Option<usize>) -> BakedFigur
             let mean = used.iter().map(|&run| of(truth.runs[run][p][o])).sum::<f64>() / n;
             let spread = used.iter().map(|&run| (of(truth.runs[run][p][o]) - mean).powi(2)).sum::<f64>();
             found.push((weight, of(stored.into()) - mean, spread / (n * (n - 1.0))));
-            sums.truth += weight * mean;
+            total += weight * mean;
         }
         // Mean squared difference without noise, from all texels of the probe. A single texel would be too noisy.
         let size = found.iter().map(|(_, d, v)| d * d - v).sum::<f64>() / texels.max(1) as f64;
         for (weight, d, v) in found {
             let folded = fold(d, size.max(0.0).sqrt(), v) / 2.0;
-            sums.difference += weight * d;
-            sums.over += weight * (d.max(0.0) - folded);
-            sums.under += weight * ((-d).max(0.0) - folded);
+            difference += weight * d;
+            over += weight * (d.max(0.0) - folded);
+            under += weight * ((-d).max(0.0) - folded);
         }
     }
-    let share = |sum: f64| (sums.truth > 0.0).then(|| sum / sums.truth);
-    BakedFigures { bias: share(sums.difference), light: share(sums.over.max(0.0)), dark: share(sums.under.max(0.0)) }
+    let share = |sum: f64| (total > 0.0).then(|| sum / total);
+    BakedFigures { bias: share(difference), light: share(over.max(0.0)), dark: share(under.max(0.0)) }
 }

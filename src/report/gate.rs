@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 /// A figure of the comparison, the bound that it is held to, and whether it holds.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Gate {
     /// Such as "irradiance.mean", "leak.light", "scene", "image.flip", "probes.worst".
     pub name: String,

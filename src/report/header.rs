@@ -19,29 +19,11 @@ pub struct Header {
     pub config: String,
 }
 
-impl Header {
-    pub fn new(
-        schema: &'static str,
-        command: &'static str,
-        seed: u64,
-        threads: usize,
-        scene_blake3: &str,
-        config: String,
-    ) -> Header {
-        let version = env!("CARGO_PKG_VERSION");
-        let scene_blake3 = scene_blake3.to_owned();
-        Header { schema, version, command, command_line: command_line(), seed, threads, scene_blake3, config }
-    }
-}
-
 /// What called this process, as a POSIX shell reads it back. The program goes by its name alone: where it lies is the machine's
 /// affair, and reports are kept with sources. Words that are not UTF-8 are shown as near as UTF-8 comes.
-pub fn command_line() -> String {
-    command_line_but(|_| true)
-}
-
-/// [`command_line`] with only those arguments that are `wanted`.
-pub fn command_line_but(wanted: impl Fn(&str) -> bool) -> String {
+///
+/// Only those arguments are told that are `wanted`.
+pub fn command_line(wanted: impl Fn(&str) -> bool) -> String {
     let arguments = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
     line_of(arguments.filter(|word| wanted(word)))
 }

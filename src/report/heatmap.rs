@@ -42,7 +42,8 @@ impl Heatmap<'_> {
     pub fn draw(&self) -> Picture8 {
         assert_eq!(self.values.len(), self.width as usize * self.height as usize, "values of the map {}", self.title);
         let Heatmap { values, range: end, title, unit, missing, .. } = *self;
-        let scale = enlargement(self.width, self.height);
+        let fitting = MAX_ENLARGED_HEIGHT / self.height.max(1);
+        let scale = legend::MIN_WIDTH.div_ceil(self.width.max(1)).min(fitting).max(1);
         let (map_width, height) = (self.width * scale, self.height * scale);
         let width = map_width.max(legend::MIN_WIDTH);
         let mut picture = Picture8::filled(width, height, SURROUND);
@@ -71,9 +72,4 @@ pub fn range_of(values: &[f32]) -> f32 {
     let rank = (RANGE_PERCENTILE * (magnitudes.len() - 1) as f64).ceil() as usize;
     // Rounding up may leave f32 at its very top.
     round_up(*magnitudes.select_nth_unstable_by(rank, f32::total_cmp).1).min(f32::MAX)
-}
-
-/// The whole number by which a small map is enlarged.
-fn enlargement(width: u32, height: u32) -> u32 {
-    legend::MIN_WIDTH.div_ceil(width.max(1)).min(MAX_ENLARGED_HEIGHT / height.max(1)).max(1)
 }

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::reference_layers::ReferenceLayers;
 use crate::math::color::luminance;
+use crate::math::statistics::Moments;
 use crate::probe::query::Query;
 use crate::shade::points::ImagePoint;
 use crate::shade::visibility_modes::VisibilityMode;
@@ -52,16 +53,11 @@ pub fn dark_region(irradiance: &[Vec3], reference: &ReferenceLayers, shown: &[bo
     let noise = reference.noise.as_ref()?;
     let used = |i: usize| shown[i] && reference.is_finite(i) && irradiance[i].is_finite();
     let mean = reference.means(used).0.filter(|mean| *mean > 0.0)?;
-    let (mut sum, mut count) = (0.0, 0.0f64);
-    for i in (0..irradiance.len()).filter(|&i| used(i)) {
-        let surely_below =
-            f64::from(luminance(reference.irradiance[i])) + DARK_SIGMAS * noise.luminance_variance(i).sqrt();
-        if surely_below < DARK_SHARE * mean {
-            sum += f64::from(luminance(irradiance[i]));
-            count += 1.0;
-        }
-    }
-    (count > 0.0).then(|| sum / count / mean)
+    let most =
+        |i: usize| f64::from(luminance(reference.irradiance[i])) + DARK_SIGMAS * noise.luminance_variance(i).sqrt();
+    let dark = (0..irradiance.len()).filter(|&i| used(i) && most(i) < DARK_SHARE * mean);
+    let dark: Moments = dark.map(|i| f64::from(luminance(irradiance[i]))).collect();
+    (dark.weight() > 0.0).then(|| dark.mean() / mean)
 }
 
 /// The leak figures of one visibility mode, except `dark_region` and `baked`. `irradiance` is that of the mode and
@@ -91,11 +87,8 @@ pub fn measure(
 
         let corners = query.weights(&point.query(), mode.visibility(masks[i]));
         let sum = f64::from(corners.total());
-        for k in 0..8 {
+        for k in (0..8).filter(|&k| corners.weights[k] > 0.0) {
             let weight = f64::from(corners.weights[k]) / sum;
-            if corners.weights[k] <= 0.0 {
-                continue;
-            }
             let contribution = luminance(query.volume.probe_irradiance(corners.probes[k], point.normal));
             let contribution = f64::from(contribution) * weight * share;
             from_all += contribution;
@@ -112,7 +105,6 @@ pub fn measure(
         fraction: ratio(from_hidden, from_all),
         weight: ratio(hidden_weight, seen),
         unseen: ratio(unseen, seen + unseen).unwrap_or(0.0),
-        dark_region: None,
-        baked: None,
+        ..Leak::default()
     }
 }

@@ -15,7 +15,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::draw::{self, Area, Drawn, INK, PALE_INK, SCALE, fitted, font, text_width, units};
 use super::ticks::{label, log_ticks};
 use crate::image::ImageError;
-use crate::system::output::{OutputError, write_atomically};
+use crate::system::output::write_atomically;
 
 /// Of a chart, px.
 const WIDTH: u32 = 900;
@@ -94,15 +94,6 @@ pub struct Chart {
     pub guides: Vec<Guide>,
 }
 
-/// A chart could not be written.
-#[derive(Debug, thiserror::Error)]
-pub enum ChartError {
-    #[error(transparent)]
-    Output(#[from] OutputError),
-    #[error(transparent)]
-    Image(#[from] ImageError),
-}
-
 impl Chart {
     /// The chart as the text of an SVG file.
     pub fn svg(&self) -> String {
@@ -113,9 +104,9 @@ impl Chart {
     ///
     /// # Errors
     /// Those of [`write_atomically`].
-    pub fn write(&self, path: &Path) -> Result<(), ChartError> {
+    pub fn write(&self, path: &Path) -> Result<(), ImageError> {
         write_atomically(&path.with_extension("svg"), |file| std::io::Write::write_all(file, self.svg().as_bytes()))?;
-        Ok(draw::picture(WIDTH, HEIGHT, |area| self.draw(area)).write_png(&path.with_extension("png"))?)
+        draw::picture(WIDTH, HEIGHT, |area| self.draw(area)).write_png(&path.with_extension("png"))
     }
 
     fn draw<DB: DrawingBackend>(&self, area: &Area<DB>) -> Drawn<DB> {

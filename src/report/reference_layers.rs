@@ -102,6 +102,11 @@ impl ReferenceLayers {
         let error = self.noise.as_ref().and_then(|noise| mean(&|i| noise.luminance_variance(i).sqrt()));
         (light, error)
     }
+
+    /// Whether the reference says something usable about a pixel.
+    pub fn is_finite(&self, pixel: usize) -> bool {
+        self.irradiance[pixel].is_finite() && self.noise.as_ref().is_none_or(|n| n.is_finite(pixel))
+    }
 }
 
 impl ReferenceNoise {
@@ -114,14 +119,9 @@ impl ReferenceNoise {
         }
         // At most what full correlation gives: files may say anything.
         let most = (variance(a) * variance(b)).sqrt();
-        match &self.covariance {
-            // Red–green, green–blue, blue–red by the channel that the pair starts with.
-            Some(covariance) => {
-                let first = if (a + 1) % 3 == b { a } else { b };
-                f64::from(covariance[pixel][first]).clamp(-most, most)
-            }
-            None => most,
-        }
+        // Red–green, green–blue, blue–red by the channel that the pair starts with.
+        let first = if (a + 1) % 3 == b { a } else { b };
+        self.covariance.as_ref().map_or(most, |covariance| f64::from(covariance[pixel][first]).clamp(-most, most))
     }
 
     /// Variance of the pixel's luminance.
@@ -134,12 +134,5 @@ impl ReferenceNoise {
     fn is_finite(&self, pixel: usize) -> bool {
         let known = self.covariance.as_ref().is_none_or(|c| c[pixel].is_finite());
         known && self.variance[pixel].is_finite()
-    }
-}
-
-impl ReferenceLayers {
-    /// Whether the reference says something usable about a pixel.
-    pub fn is_finite(&self, pixel: usize) -> bool {
-        self.irradiance[pixel].is_finite() && self.noise.as_ref().is_none_or(|n| n.is_finite(pixel))
     }
 }

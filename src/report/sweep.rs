@@ -10,6 +10,7 @@ use super::header::Header;
 use super::leak::Leak;
 use super::render::ReferenceSummary;
 use crate::bake::figures::Rays;
+use crate::math::statistics::Moments;
 
 /// Version of the report's layout.
 pub const SCHEMA: &str = "lightprobe-sweep/1";
@@ -57,20 +58,20 @@ pub struct LadderReport {
     pub method: String,
     pub configurations: Vec<usize>,
     /// What of its own nothing beats.
-    pub fronts: Fronts,
+    pub fronts: PerFront<Vec<usize>>,
     /// The configuration of least error.
     pub best: Option<usize>,
     /// Smallest `bias_relative` of its configurations that bias rules.
     pub floor_relative: Option<f64>,
 }
 
-/// Front of error against each cost, and of leaks against bytes.
-#[derive(Debug, Clone, Default, Serialize)]
-pub struct Fronts {
-    pub bake_s: Vec<usize>,
-    pub bytes: Vec<usize>,
-    pub shade_ms: Vec<usize>,
-    pub leak_light: Vec<usize>,
+/// Of the front of error against each cost, and of that of leaks against bytes.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct PerFront<T> {
+    pub bake_s: T,
+    pub bytes: T,
+    pub shade_ms: T,
+    pub leak_light: T,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -93,7 +94,7 @@ pub struct ConfigurationReport {
     /// "noise" or "bias".
     pub ruled_by: Option<&'static str>,
     /// Whether nothing beats it in the whole sweep.
-    pub on_front: OnFront,
+    pub on_front: PerFront<bool>,
     pub runs: Vec<RunRecord>,
 }
 
@@ -101,14 +102,6 @@ pub struct ConfigurationReport {
 pub struct AxisValue {
     pub key: String,
     pub value: String,
-}
-
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct OnFront {
-    pub bake_s: bool,
-    pub bytes: bool,
-    pub shade_ms: bool,
-    pub leak_light: bool,
 }
 
 /// A figure over the seeds; all `null` where it is undefined with any of them.
@@ -125,14 +118,12 @@ impl Aggregate {
     pub fn of(values: &[Option<f64>]) -> Aggregate {
         let values: Option<Vec<f64>> = values.iter().map(|v| v.filter(|v| v.is_finite())).collect();
         let Some(values) = values.filter(|v| !v.is_empty()) else { return Aggregate::default() };
-        let n = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let scatter: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
+        let moments: Moments = values.iter().copied().collect();
         Aggregate {
-            mean: Some(mean),
+            mean: Some(moments.mean()),
             min: values.iter().copied().reduce(f64::min),
             max: values.iter().copied().reduce(f64::max),
-            standard_error: (values.len() > 1).then(|| (scatter / (n * (n - 1.0))).sqrt()),
+            standard_error: (values.len() > 1).then(|| (moments.variance() / (moments.weight() - 1.0)).sqrt()),
         }
     }
 }

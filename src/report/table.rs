@@ -4,7 +4,7 @@ use std::fmt;
 use std::io::IsTerminal;
 
 use comfy_table::presets::{NOTHING, UTF8_FULL_CONDENSED};
-use comfy_table::{Cell, CellAlignment, ContentArrangement, Table as Renderer};
+use comfy_table::{CellAlignment, ContentArrangement, Table as Renderer};
 
 /// How a column is set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,16 +15,21 @@ pub enum Column {
     Number,
 }
 
-/// Rows of ready strings: [`super::format`] makes them from numbers.
+/// Rows of ready strings: [`crate::system::format`] makes them from numbers.
 #[derive(Debug, Clone)]
-pub struct Table {
-    columns: Vec<(String, Column)>,
-    rows: Vec<Vec<String>>,
-}
+pub struct Table(Renderer);
 
 impl Table {
     pub fn new(columns: &[(&str, Column)]) -> Table {
-        Table { columns: columns.iter().map(|&(name, kind)| (name.to_owned(), kind)).collect(), rows: Vec::new() }
+        let mut renderer = Renderer::new();
+        renderer.set_header(columns.iter().map(|(name, _)| *name));
+        for (column, (_, kind)) in renderer.column_iter_mut().zip(columns) {
+            column.set_cell_alignment(match kind {
+                Column::Text => CellAlignment::Left,
+                Column::Number => CellAlignment::Right,
+            });
+        }
+        Table(renderer)
     }
 
     /// Adds a row.
@@ -33,37 +38,26 @@ impl Table {
     /// When it does not have a cell for each column.
     pub fn push<S: Into<String>>(&mut self, row: impl IntoIterator<Item = S>) {
         let row: Vec<String> = row.into_iter().map(Into::into).collect();
-        assert_eq!(row.len(), self.columns.len(), "cells in a row");
-        self.rows.push(row);
+        assert_eq!(row.len(), self.0.column_count(), "cells in a row");
+        self.0.add_row(row);
     }
 
     /// The whole table, without a line end behind it. On a terminal cells are wrapped where it is too narrow.
     pub fn render(&self, on_terminal: bool) -> String {
-        let mut renderer = Renderer::new();
+        let mut renderer = self.0.clone();
         if on_terminal {
             renderer
                 .load_style(UTF8_FULL_CONDENSED.with_rounded_corners())
                 .set_content_arrangement(ContentArrangement::Dynamic);
         } else {
             renderer.load_style(NOTHING).force_no_tty();
-        }
-        renderer.set_header(self.columns.iter().map(|(name, kind)| cell(name, *kind)));
-        for row in &self.rows {
-            renderer.add_row(row.iter().zip(&self.columns).map(|(text, (_, kind))| cell(text, *kind)));
-        }
-        if !on_terminal && let Some(first) = renderer.column_mut(0) {
             // Lines that start with a blank are a nuisance to cut and sort.
-            first.set_padding((0, 1));
+            renderer.column_iter_mut().take(1).for_each(|first| {
+                first.set_padding((0, 1));
+            });
         }
         renderer.trim_fmt()
     }
-}
-
-fn cell(text: &str, kind: Column) -> Cell {
-    Cell::new(text).set_alignment(match kind {
-        Column::Text => CellAlignment::Left,
-        Column::Number => CellAlignment::Right,
-    })
 }
 
 /// As standard output wants it.

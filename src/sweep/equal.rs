@@ -76,7 +76,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::report::sweep::{Aggregate, Fronts, OnFront};
+    use crate::report::sweep::{Aggregate, PerFront};
 
     fn configuration(ladder: usize, bytes: f64, error: f64) -> ConfigurationReport {
         let of = |value: f64| Aggregate::of(&[Some(value)]);
@@ -92,7 +92,7 @@ mod tests {
             bias_rms: None,
             bias_relative: None,
             ruled_by: None,
-            on_front: OnFront::default(),
+            on_front: PerFront::default(),
             runs: Vec::new(),
         }
     }
@@ -102,7 +102,7 @@ mod tests {
             name: name.to_owned(),
             method: name.to_owned(),
             configurations: configurations.to_vec(),
-            fronts: Fronts::default(),
+            fronts: PerFront::default(),
             best: None,
             floor_relative: None,
         }

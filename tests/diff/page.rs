@@ -82,3 +82,21 @@ fn sides_that_agree_give_a_page_that_says_so() {
     assert!(page.contains(&format!("Pass: all {} gates hold", found["verdict"]["gates"])));
     assert!(page.contains("error against bake time") && page.contains("data:image/svg+xml"));
 }
+
+#[test]
+fn what_cannot_be_compared_is_told_in_words() {
+    let folder = Folder::new();
+    let side = |name: &str, config: &str, energy: f64| {
+        let report = json!({"schema": "lightprobe-bake/1", "config": config, "bounces": [{"energy": energy}]});
+        folder.write(name, report.to_string())
+    };
+    let base = side("base.json", "(of_a_later_version: 1)", 0.0);
+    let page = |candidate: std::path::PathBuf| {
+        report(&diff(&folder, &base, &candidate, &[]));
+        fs::read_to_string(folder.path().join("out/index.html")).unwrap()
+    };
+    let differs = page(side("other.json", "(of_a_later_version: 2)", 1.0));
+    assert!(differs.contains("<strong>from 0</strong>"), "a change from 0 is no number");
+    assert!(differs.contains("The configurations differ") && !differs.contains("The same on both sides"));
+    assert!(page(side("same.json", "(of_a_later_version: 1)", 0.0)).contains("The same on both sides"));
+}

@@ -1,13 +1,18 @@
 //! A comparison made up: light of many magnitudes, a pixel that is no number, names that would break a careless page.
 
-use std::borrow::Cow;
-
 use glam::Vec3;
+use lightprobe::image::Picture;
+use lightprobe::math::color::luminance;
+use lightprobe::probe::lattice::ProbeState;
+use lightprobe::report::diff::figures::Figure;
+use lightprobe::report::diff::images::{ImageReport, Layer};
+use lightprobe::report::diff::probes::{ProbeRow, ProbesReport};
+use lightprobe::report::diff::shown;
+use lightprobe::report::diff::{DiffReport, SideReport, Verdict};
 use lightprobe::report::gate::{Gate, sort};
-use lightprobe::report::page::{
-    Command, ConfigChange, Figure, FigureTable, Histogram, PackedImage, Page, PageImage, Plot, ProbeComparison,
-    ProbeRow, Side,
-};
+use lightprobe::report::page::{Command, ConfigChange};
+use minijinja::context;
+use serde_json::json;
 
 /// Breaks out of attributes, elements, scripts and comments, and turns the text after it around.
 pub const HOSTILE: &str = "</script><img src=x onerror=\"window.boom=1\">'\"`<!-- \u{202E}gnp.exr";
@@ -25,28 +30,26 @@ pub fn light(side: usize, x: u32, y: u32) -> Vec3 {
     if side == 0 { base } else { Vec3::new(base.z, 0.5 * base.y + 0.01 * x as f32, base.x) }
 }
 
-fn pair(name: &str, width: u32, height: u32, of: impl Fn(usize, u32, u32) -> Vec3) -> PageImage<'static> {
-    let side = |side| -> Cow<'static, [Vec3]> {
-        Cow::Owned((0..width * height).map(|i| of(side, i % width, i / width)).collect())
+fn pair(name: &str, width: u32, height: u32, of: impl Fn(usize, u32, u32) -> Vec3) -> Layer {
+    let side = |side| {
+        Picture::from_pixels(width, height, (0..width * height).map(|i| of(side, i % width, i / width)).collect())
     };
-    PageImage {
-        name: name.to_owned(),
-        quantity: "radiance".to_owned(),
-        unit: "W·m⁻²·sr⁻¹".to_owned(),
+    let report = ImageReport {
+        item: name.to_owned(),
+        layer: "beauty".to_owned(),
         width,
         height,
-        base: side(0),
-        candidate: side(1),
-        exposure_ev: EXPOSURE_EV,
-        is_display_referred: false,
-        is_judged: true,
-        is_compared: None,
-        figures: vec![
-            Figure { name: "rmse".to_owned(), value: Some(0.0123), ..Figure::default() },
-            Figure { name: "psnr".to_owned(), value: None, unit: "dB".to_owned(), ..Figure::default() },
-        ],
-        worst_pixel: Some([width / 3, height / 2]),
-    }
+        judged: true,
+        is_display: false,
+        quantity: "radiance",
+        unit: "W·m⁻²·sr⁻¹",
+        exposure_ev: Some(EXPOSURE_EV),
+        figures: json!({"rmse": 0.0123, "worst": {"x": width / 3, "y": height / 2}}),
+        path_base: String::new(),
+        path_candidate: String::new(),
+        difference_map: None,
+    };
+    Layer { report, base: side(0), candidate: side(1), difference: Vec::new() }
 }
 
 pub fn gate(name: &str, item: &str, value: f64, threshold: f64) -> Gate {
@@ -90,71 +93,63 @@ pub fn gates() -> Vec<Gate> {
 }
 
 /// A page of these pairs.
-pub fn page_of(images: Vec<PageImage<'static>>) -> String {
-    let gates = gates();
-    let side = |label: &str| Side {
+fn page_of(mut images: Vec<Layer>) -> String {
+    let side = |label: &str| SideReport {
         path: format!("out/{label}/{HOSTILE}"),
         kind: "render folder".to_owned(),
+        items: 1,
         seed: Some(7),
+        config: Some("()".to_owned()),
         scene_blake3: Some("4f1ab0c2".repeat(8)),
     };
-    let row = |i: u64| ProbeRow {
+    let row = |i: usize| ProbeRow {
         index: 17 * i,
+        candidate_index: 17 * i,
         position_m: [i as f64 - 3.5, 1.25, 0.125 * i as f64],
-        irradiance: Some(0.4 / (1.0 + i as f64)),
-        distance_m: (i > 2).then_some(0.03),
-        base_state: "active".to_owned(),
-        candidate_state: if i == 1 { "inside geometry" } else { "active" }.to_owned(),
-        moved_m: Some(0.0),
+        state_base: ProbeState::Active,
+        state_candidate: if i == 1 { ProbeState::InsideGeometry } else { ProbeState::Active },
+        moved_m: 0.0,
+        irradiance_base: 1.0,
+        irradiance_candidate: 1.0,
+        irradiance_difference: 0.4,
+        irradiance_difference_relative: 0.4 / (1.0 + i as f64),
+        distance_difference_m: (i > 2).then_some(0.03),
     };
-    let differences = (0..300).map(|i| (i as f32 * 0.7).sin().powi(5) * 0.2).collect();
-    let figure = |name: &str, unit: &str, base: f64, candidate: f64| Figure {
+    let figure = |item: &str, name: &str, base: f64, candidate: f64| Figure {
+        item: item.to_owned(),
         name: name.to_owned(),
         base: Some(base),
         candidate: Some(candidate),
-        value: Some(candidate - base),
-        standard_error: None,
-        unit: unit.to_owned(),
+        difference: Some(candidate - base),
     };
-    let page = Page {
-        title: "two_rooms_open, default against visibility off".to_owned(),
-        sides: [side("base"), side("candidate")],
-        gates: &gates,
-        images: images.iter().map(|image| PackedImage::new(image, images.len()).unwrap()).collect(),
-        probes: vec![ProbeComparison {
-            name: "two_rooms_open.probes".to_owned(),
-            figures: vec![figure("probes", "", 300.0, 300.0), figure("mean irradiance", "W·m⁻²", 1.271, 1.05)],
+    let gates = gates();
+    let report = DiffReport {
+        base: side("base"),
+        candidate: side("candidate"),
+        verdict: Verdict::of(&gates),
+        gates,
+        probes: vec![ProbesReport {
+            item: "two_rooms_open.probes".to_owned(),
+            figures: json!({"probes_base": 300, "probes_candidate": 300, "irradiance_base": 1.271, "irradiance_candidate": 1.05}),
             worst: (0..10).map(row).collect(),
-            histograms: vec![Histogram {
-                title: "Relative difference of irradiance".to_owned(),
-                unit: String::new(),
-                what: "probes".to_owned(),
-                values: differences,
-            }],
+            changes_percent: (0..300).map(|i| (i as f32 * 0.7).sin().powi(5) * 20.0).collect(),
+            distance_differences_m: Vec::new(),
         }],
         figures: vec![
-            FigureTable {
-                title: "lit/report.json".to_owned(),
-                figures: vec![figure("shade_ms.median", "s", 0.0123, 0.0119), figure("peak memory", "bytes", 3.0e8, 2.9e8)],
-            },
-            FigureTable { title: HOSTILE.to_owned(), figures: vec![figure(HOSTILE, "", 1.0, 2.0)] },
+            figure("lit", "methods.visibility_on.shade_ms.median", 12.3, 11.9),
+            figure("lit", "peak_memory_bytes", 3.0e8, 2.9e8),
+            figure(HOSTILE, HOSTILE, 1.0, 2.0),
         ],
-        plots: vec![Plot {
-            title: "Error against time".to_owned(),
-            svg: "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 400 200\"><script>window.boom=2</script>\
-                  <image href=\"http://example.org/x.png\"/><path d=\"M20 20 L380 180\" stroke=\"#06c\"/></svg>"
-                .to_owned(),
-        }],
         added: vec!["dark/extra.exr".to_owned()],
         missing: vec![HOSTILE.to_owned()],
-        commands: &[
+        commands: vec![
             Command {
                 purpose: "Bake the candidate".to_owned(),
                 line: "lightprobe bake scenes/two_rooms_open.glb -o candidate.probes --set grid.spacing_m=1 --set query.visibility=none --seed 7".to_owned(),
             },
             Command { purpose: "Compare".to_owned(), line: format!("lightprobe diff-report base '{HOSTILE}' -o diff") },
         ],
-        config_changes: Some(&vec![
+        config_changes: Some(vec![
             ConfigChange {
                 key: "query.visibility".to_owned(),
                 base: Some("moments".to_owned()),
@@ -163,20 +158,31 @@ pub fn page_of(images: Vec<PageImage<'static>>) -> String {
             ConfigChange { key: HOSTILE.to_owned(), base: Some(HOSTILE.to_owned()), candidate: None },
         ]),
         notes: vec!["Same seed and configuration of capture: noise explains nothing.".to_owned()],
+        ..DiffReport::default()
     };
-    lightprobe::report::page::render(page).unwrap()
+    let pairs = images.len();
+    let packed = images.iter_mut().map(|layer| {
+        let pixels = layer.base.pixels.iter().zip(&layer.candidate.pixels);
+        layer.difference = pixels.map(|(base, candidate)| luminance(*candidate - *base)).collect();
+        shown::image(layer, pairs).unwrap()
+    });
+    let plots = vec![context! {
+        title => "Error against time",
+        svg => "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 400 200\"><script>window.boom=2</script>\
+              <image href=\"http://example.org/x.png\"/><path d=\"M20 20 L380 180\" stroke=\"#06c\"/></svg>",
+    }];
+    shown::page(&report, packed.collect(), plots).unwrap()
 }
 
 /// Three pairs: light with a pixel that is no number, a hostile name, a PNG.
 pub fn page() -> String {
     let mut first = pair("lit/visibility_on: beauty", WIDTH, HEIGHT, light);
-    first.candidate.to_mut()[(NAN_AT.1 * WIDTH + NAN_AT.0) as usize] = Vec3::new(0.1, f32::NAN, 0.1);
+    first.candidate.pixels[(NAN_AT.1 * WIDTH + NAN_AT.0) as usize] = Vec3::new(0.1, f32::NAN, 0.1);
     let second = pair(HOSTILE, 48, 20, |side, x, y| light(side, x % WIDTH, y % HEIGHT) * 1.0e4);
     let mut third =
         pair("probes.png", 40, 30, |side, x, y| Vec3::new(x as f32 / 40.0, y as f32 / 30.0, 0.5 * side as f32));
-    third.is_display_referred = true;
-    third.is_judged = false;
-    third.unit = String::new();
+    (third.report.is_display, third.report.exposure_ev, third.report.unit) = (true, None, "");
+    third.report.judged = false;
     page_of(vec![first, second, third])
 }
 

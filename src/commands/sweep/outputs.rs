@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 
 use crate::commands::write_json;
 use crate::report::plot::{Chart, Guide, Mark, Series};
-use crate::report::sweep::{Aggregate, ConfigurationReport, Fronts, LadderReport, SweepReport};
+use crate::report::sweep::{Aggregate, ConfigurationReport, LadderReport, PerFront, SweepReport};
 use crate::system::format;
 use crate::system::output::write_atomically;
 
@@ -102,7 +102,7 @@ const ERROR: Along =
 const LEAK: Along = Along { figure: "leak_light", label: "leaked light ÷ light (%)", factor: 100.0 };
 
 fn charts(report: &SweepReport) -> [(&'static str, Chart); 4] {
-    let chart = |title: &str, x: Along, y: Along, front: fn(&Fronts) -> &Vec<usize>| {
+    let chart = |title: &str, x: Along, y: Along, front: fn(&PerFront<Vec<usize>>) -> &Vec<usize>| {
         let series =
             report.ladders.iter().map(|ladder| series(report, ladder, &x, &y, front(&ladder.fronts))).collect();
         let seeds = match report.seeds.len() {

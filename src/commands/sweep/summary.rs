@@ -7,8 +7,8 @@ use crate::commands::session::Session;
 use crate::config::Config;
 use crate::report::render::ReferenceSummary;
 use crate::report::sweep::{
-    Aggregate, AxisValue, Cheapest, CheapestAt, ConfigurationReport, ERROR_FIGURE, FloorReport, Fronts, LadderReport,
-    MethodFigures, OnFront, RunRecord, SCHEMA, SweepReport, SweepTimes,
+    Aggregate, AxisValue, Cheapest, CheapestAt, ConfigurationReport, ERROR_FIGURE, FloorReport, LadderReport,
+    MethodFigures, PerFront, RunRecord, SCHEMA, SweepReport, SweepTimes,
 };
 use crate::scene::Camera;
 use crate::shade::points::View;
@@ -67,7 +67,7 @@ impl Outcome {
             bias_rms: split.bias_rms,
             bias_relative: relative(split.bias_rms),
             ruled_by: split.ruled_by(),
-            on_front: OnFront::default(),
+            on_front: PerFront::default(),
             runs,
         };
         Outcome { config: rung.config.clone(), report }
@@ -85,8 +85,8 @@ fn front(outcomes: &[Outcome], which: &[usize], cost: &str, error: &str) -> Vec<
     which.iter().zip(pareto(&points)).filter(|(_, on)| *on).map(|(i, _)| *i).collect()
 }
 
-fn fronts(outcomes: &[Outcome], which: &[usize]) -> Fronts {
-    Fronts {
+fn fronts(outcomes: &[Outcome], which: &[usize]) -> PerFront<Vec<usize>> {
+    PerFront {
         bake_s: front(outcomes, which, "bake_s", "error_relative"),
         bytes: front(outcomes, which, "bytes", "error_relative"),
         shade_ms: front(outcomes, which, "shade_ms", "error_relative"),
@@ -132,7 +132,7 @@ pub fn report(parts: Parts) -> SweepReport {
     let all: Vec<usize> = (0..outcomes.len()).collect();
     let whole = fronts(&outcomes, &all);
     for (i, m) in outcomes.iter_mut().enumerate() {
-        m.report.on_front = OnFront {
+        m.report.on_front = PerFront {
             bake_s: whole.bake_s.contains(&i),
             bytes: whole.bytes.contains(&i),
             shade_ms: whole.shade_ms.contains(&i),

@@ -13,13 +13,13 @@ use super::pairs::{Paired, check, pair_up, pictures};
 use super::probes;
 use super::report::{DiffReport, SCHEMA, SideReport, Verdict};
 use super::rules::{Finding, findings};
-use super::shown::{self, Shown};
+use super::shown;
 use super::sides::{Item, Kind, Side};
 use super::sweep_plot;
 use super::thresholds::{Exception, Thresholds};
 use crate::image::Picture8;
 use crate::report::gate::{self, Gate};
-use crate::report::page::Command;
+use crate::report::page::{Command, PackedImage};
 
 /// Gates that a scene which is allowed to change does not fail by that alone.
 const OF_THE_SCENE: &[&str] = &["scene", "image.surface"];
@@ -40,7 +40,9 @@ pub struct Request<'a> {
 #[derive(Debug, Default)]
 pub struct Compared {
     pub report: DiffReport,
-    pub shown: Shown,
+    /// Of the page.
+    pub images: Vec<PackedImage>,
+    pub plots: Vec<minijinja::Value>,
     pub pictures: Vec<(String, Picture8)>,
     /// How many pairs of pictures the page shows, at most; `None`: nothing is shown.
     shown_pairs: Option<usize>,
@@ -56,21 +58,12 @@ pub fn compare(request: &Request, mut on_item: impl FnMut(&str)) -> Result<Compa
     // All that headers and reports tell is said before the work.
     let shown_pairs = Some(check(&pairs, request.mask)?);
     let mut compared = Compared { shown_pairs, ..Compared::default() };
-    let (base, candidate) = (side_report(&sides[0]), side_report(&sides[1]));
-    let thresholds = request.thresholds.clone();
-    let config_changes = config_changes([base.config.as_deref(), candidate.config.as_deref()]);
-    let (added, missing, version) = (pairs.added, pairs.missing, env!("CARGO_PKG_VERSION"));
-    compared.report = DiffReport {
-        schema: SCHEMA,
-        version,
-        base,
-        candidate,
-        added,
-        missing,
-        config_changes,
-        thresholds,
-        ..Default::default()
-    };
+    let report = &mut compared.report;
+    (report.schema, report.version) = (SCHEMA, env!("CARGO_PKG_VERSION"));
+    (report.base, report.candidate) = (side_report(&sides[0]), side_report(&sides[1]));
+    report.config_changes = config_changes([report.base.config.as_deref(), report.candidate.config.as_deref()]);
+    (report.added, report.missing) = (pairs.added, pairs.missing);
+    report.thresholds = request.thresholds.clone();
     let mut all = Vec::new();
     for Paired { name, bases, candidate } in &pairs.both {
         on_item(name);
@@ -104,7 +97,7 @@ pub fn compare(request: &Request, mut on_item: impl FnMut(&str)) -> Result<Compa
 }
 
 fn judge(request: &Request, all: Vec<Finding>, report: &DiffReport) -> Vec<Gate> {
-    let scene_changed = all.iter().any(|finding| finding.rule.gate == "scene" && finding.value == Some(1.0));
+    let scene_changed = all.iter().any(|finding| finding.gate.name == "scene" && finding.gate.value == Some(1.0));
     let mut gates: Vec<Gate> = all.into_iter().map(|finding| request.thresholds.judge(finding)).collect();
     for gate in &mut gates {
         if request.allow_scene_change && scene_changed && OF_THE_SCENE.contains(&gate.name.as_str()) && !gate.passed {
@@ -185,7 +178,7 @@ impl Compared {
             let [base, candidate] = sides.map(Facts::configurations);
             self.report.missing.extend(base.difference(&candidate).map(|label| join(name, label)));
             self.report.added.extend(candidate.difference(&base).map(|label| join(name, label)));
-            self.shown.plots.extend(sweep_plot::plot(name, &a.report, &b.report));
+            self.plots.extend(sweep_plot::plot(name, &a.report, &b.report));
         }
         for pair in pictures(name, [a, b], mask) {
             match (pair.base.is_file(), pair.candidate.is_file()) {
@@ -207,7 +200,7 @@ impl Compared {
                 all.extend(findings("image", &layer.report.item, none, &Facts::of(&layer.report.figures), pair.seeds));
             }
             if let Some(pairs) = self.shown_pairs {
-                self.shown.images.push(shown::image(&layer, pairs)?);
+                self.images.push(shown::image(&layer, pairs)?);
                 let name = self.free_name(&layer.report.item);
                 self.pictures.push((name.clone(), layer.difference_map()));
                 layer.report.difference_map = Some(name);

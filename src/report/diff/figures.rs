@@ -105,28 +105,18 @@ pub enum Seeds {
 }
 
 impl Seeds {
-    /// All seeds that went into both sides count: a render's own is that of its lamps' samples, its probes have that of their bake.
+    /// All seeds that went into both sides count: a render's own is that of its lamps' samples, its probes have that of their bake; a
+    /// sweep has several.
     pub fn of(sides: [&Facts; 2]) -> Seeds {
-        let is_render = sides.iter().any(|side| side.text("command") == Some("render"));
-        let is_sweep = sides.iter().all(|side| side.get("seeds").is_some());
-        let keys: &[&str] = match (is_render, is_sweep) {
-            (true, _) => &["seed", "bake_seed"],
-            (_, true) => &["seeds"],
-            _ => &["seed"],
-        };
-        let equal = |key: &&str| sides[0].get(key).zip(sides[1].get(key)).map(|(base, candidate)| base == candidate);
-        let equal: Vec<Option<bool>> = keys.iter().map(equal).collect();
+        let is_told = |key: &&str| sides.iter().any(|side| side.0.contains_key(*key));
+        let equal = |key: &str| sides[0].get(key).zip(sides[1].get(key)).map(|(base, candidate)| base == candidate);
+        let equal: Vec<Option<bool>> = ["seed", "bake_seed", "seeds"].into_iter().filter(is_told).map(equal).collect();
         match equal {
             _ if equal.contains(&Some(false)) => Seeds::Other,
-            _ if equal.contains(&None) => Seeds::Unknown,
+            _ if equal.is_empty() || equal.contains(&None) => Seeds::Unknown,
             _ => Seeds::Equal,
         }
     }
-}
-
-/// A number at a place such as "figures.leak_light.mean".
-pub fn number(value: &Value, place: &str) -> Option<f64> {
-    place.split('.').try_fold(value, |value, key| value.get(key))?.as_f64()
 }
 
 /// Name of a part of an item.
@@ -151,15 +141,18 @@ pub fn side_by_side(item: &str, sides: [&Facts; 2]) -> Vec<Figure> {
     names.into_iter().filter(is_figure).filter_map(figure).collect()
 }
 
-/// Keys of two effective configurations that differ; nothing where this program cannot read one of them.
-pub fn config_changes(texts: [Option<&str>; 2]) -> Vec<ConfigChange> {
-    let facts = |text: Option<&str>| Some(Facts::of(&serde_json::to_value(Config::parse(text?, "").ok()?).ok()?));
-    let [Some(base), Some(candidate)] = texts.map(facts) else { return Vec::new() };
+/// Keys of two effective configurations that differ. `None`: a side has none, or both differ and this program cannot read one.
+pub fn config_changes([base, candidate]: [Option<&str>; 2]) -> Option<Vec<ConfigChange>> {
+    if base? == candidate? {
+        return Some(Vec::new());
+    }
+    let facts = |text: &str| Some(Facts::of(&serde_json::to_value(Config::parse(text, "").ok()?).ok()?));
+    let (base, candidate) = (facts(base?)?, facts(candidate?)?);
     let keys: BTreeSet<&String> = base.0.keys().chain(candidate.0.keys()).collect();
     let value = |facts: &Facts, key: &String| facts.0.get(key).map(|v| v.to_string().trim_matches('"').to_owned());
     let change =
         |key: &String| ConfigChange { key: key.clone(), base: value(&base, key), candidate: value(&candidate, key) };
-    keys.into_iter().map(change).filter(|change| change.base != change.candidate).collect()
+    Some(keys.into_iter().map(change).filter(|change| change.base != change.candidate).collect())
 }
 
 #[cfg(test)]
@@ -173,8 +166,9 @@ mod tests {
             Config::default().with_overrides(&assignments).unwrap().to_ron()
         };
         let base = with(&[]);
-        assert_eq!(config_changes([Some(&base), Some(&base)]), []);
-        let changes = config_changes([Some(&base), Some(&with(&["query.visibility=none", "encoding.border=0"]))]);
+        assert_eq!(config_changes([Some(&base), Some(&base)]), Some(Vec::new()));
+        let changes =
+            config_changes([Some(&base), Some(&with(&["query.visibility=none", "encoding.border=0"]))]).unwrap();
         let names: Vec<&str> = changes.iter().map(|c| c.key.as_str()).collect();
         assert_eq!(
             names,
@@ -188,6 +182,10 @@ mod tests {
             ]
         );
         assert_eq!(changes[3].candidate.as_deref(), Some("0"));
+        // Of another version, and not told.
+        assert_eq!(config_changes([Some(&base), Some("(of_later: 1)")]), None);
+        assert_eq!(config_changes([Some("(of_later: 1)"); 2]), Some(Vec::new()));
+        assert_eq!(config_changes([Some(&base), None]), None);
     }
 
     #[test]

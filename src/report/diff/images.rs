@@ -59,6 +59,9 @@ pub struct ImageReport {
     pub judged: bool,
     /// Codes for a screen, and not light.
     pub is_display: bool,
+    /// What the pixels are, and their unit; empty for codes of a screen.
+    pub quantity: &'static str,
+    pub unit: &'static str,
     /// Of the base, for both.
     pub exposure_ev: Option<f32>,
     #[serde(flatten)]
@@ -90,18 +93,8 @@ pub struct Layer {
     pub report: ImageReport,
     pub base: Picture,
     pub candidate: Picture,
-    /// Which pixels are compared.
-    pub used: Vec<bool>,
-    /// Column and row of the pixel that differs most.
-    pub worst: Option<[u32; 2]>,
-    /// What the pixels are, and their unit; empty for codes of a screen.
-    pub quantity: [&'static str; 2],
-}
-
-impl Pair<'_> {
-    fn counts(&self, pixel: usize) -> bool {
-        self.mask.is_none_or(|mask| mask.counts[pixel])
-    }
+    /// Of every pixel, luminance of candidate − base; not a number where none is compared.
+    pub difference: Vec<f32>,
 }
 
 /// Refuses pictures that cannot be compared, by their headers. `kept`: bytes that pairs before this one leave in memory; returned
@@ -162,7 +155,7 @@ fn read(path: &Path, layer: &str) -> Result<(Picture, bool), DiffError> {
 fn compare_layer(pair: &Pair, layer: &str, is_named: bool) -> Result<Layer, DiffError> {
     let (base, candidate) = rayon::join(|| read(&pair.base, layer), || read(&pair.candidate, layer));
     let ((base, is_display), (candidate, _)) = (base?, candidate?);
-    let all = || (0..base.pixels.len()).filter(|i| pair.counts(*i));
+    let all = || (0..base.pixels.len()).filter(|i| pair.mask.is_none_or(|mask| mask.counts[*i]));
     let non_finite = |picture: &Picture| all().filter(|i| !picture.pixels[*i].is_finite()).count();
     let [non_finite_base, non_finite_candidate] = [non_finite(&base), non_finite(&candidate)];
     let mut used = vec![false; base.pixels.len()];
@@ -187,7 +180,6 @@ fn compare_layer(pair: &Pair, layer: &str, is_named: bool) -> Result<Layer, Diff
     let has_changed = |b: Vec3, c: Vec3| f64::from((c - b).abs().element_sum()) > CHANGED_SHARE * own(b, c);
     let distance = |(_, b, c): &(usize, Vec3, Vec3)| (*c - *b).as_dvec3().length_squared();
     let worst = compared().max_by(|a, b| distance(a).total_cmp(&distance(b))).filter(|pixel| distance(pixel) > 0.0);
-    let at = |i: usize| [i as u32 % base.width, i as u32 / base.width];
     let exposure_ev = (!is_display).then(|| pair.exposure_ev.unwrap_or_else(|| base.auto_exposure_ev()));
     let figures = json!({
         // Those that are finite on both sides and not masked.
@@ -209,8 +201,17 @@ fn compare_layer(pair: &Pair, layer: &str, is_named: bool) -> Result<Layer, Diff
         // What is no light has no look: irradiance is compared in numbers alone.
         "flip": if layer == LIGHT[1] { None } else { flip(&base, &candidate, exposure_ev, &used) },
         // The pixel that differs most, from the left and from the top.
-        "worst": worst.map(|(i, b, c)| json!({"x": at(i)[0], "y": at(i)[1], "base": b.to_array(), "candidate": c.to_array()})),
+        "worst": worst.map(|(i, b, c)| {
+            let (x, y) = (i as u32 % base.width, i as u32 / base.width);
+            json!({"x": x, "y": y, "base": b.to_array(), "candidate": c.to_array()})
+        }),
     });
+    let (quantity, unit) = match layer {
+        _ if is_display => ("colours of a screen", ""),
+        "beauty" => ("radiance", "W·m⁻²·sr⁻¹"),
+        "irradiance_indirect" => ("indirect irradiance", "W·m⁻²"),
+        _ => ("light", "W·m⁻²"),
+    };
     let report = ImageReport {
         item: if is_named { join(&pair.item, layer) } else { pair.item.clone() },
         layer: layer.to_owned(),
@@ -218,20 +219,17 @@ fn compare_layer(pair: &Pair, layer: &str, is_named: bool) -> Result<Layer, Diff
         height: base.height,
         judged: pair.judged,
         is_display,
+        quantity,
+        unit,
         exposure_ev,
         figures,
         path_base: pair.base.display().to_string(),
         path_candidate: pair.candidate.display().to_string(),
         difference_map: None,
     };
-    let quantity = match layer {
-        _ if is_display => ["colours of a screen", ""],
-        "beauty" => ["radiance", "W·m⁻²·sr⁻¹"],
-        "irradiance_indirect" => ["indirect irradiance", "W·m⁻²"],
-        _ => ["light", "W·m⁻²"],
-    };
-    let worst = worst.map(|(i, ..)| at(i));
-    Ok(Layer { report, base, candidate, used, worst, quantity })
+    let mut difference = vec![f32::NAN; used.len()];
+    compared().for_each(|(i, b, c)| difference[i] = luminance(c) - luminance(b));
+    Ok(Layer { report, base, candidate, difference })
 }
 
 fn flip(base: &Picture, candidate: &Picture, exposure_ev: Option<f32>, used: &[bool]) -> Option<Value> {
@@ -253,18 +251,15 @@ fn flip(base: &Picture, candidate: &Picture, exposure_ev: Option<f32>, used: &[b
 }
 
 impl Layer {
-    /// Candidate minus base, luminance.
+    /// The differences as a picture.
     pub fn difference_map(&self) -> Picture8 {
-        let pairs = self.base.pixels.par_iter().zip(&self.candidate.pixels).zip(&self.used);
-        let values: Vec<f32> =
-            pairs.map(|((b, c), used)| if *used { luminance(*c) - luminance(*b) } else { f32::NAN }).collect();
         Heatmap {
-            values: &values,
+            values: &self.difference,
             width: self.base.width,
             height: self.base.height,
-            range: range_of(&values),
+            range: range_of(&self.difference),
             title: &format!("candidate minus base {}", self.report.item),
-            unit: self.quantity[1],
+            unit: self.report.unit,
             missing: "not compared",
         }
         .draw()
@@ -293,7 +288,9 @@ pub fn surfaces(pair: &Pair) -> Result<Option<f64>, DiffError> {
             (b[i] - c[i]).abs().max_element() > most * scale
         })
     };
-    let counted: Vec<usize> = (0..base.width as usize * base.height as usize).filter(|i| pair.counts(*i)).collect();
+    let counted: Vec<usize> = (0..base.width as usize * base.height as usize)
+        .filter(|i| pair.mask.is_none_or(|mask| mask.counts[*i]))
+        .collect();
     let different = counted.par_iter().filter(|i| differs(**i)).count();
     Ok(Some(100.0 * different as f64 / counted.len().max(1) as f64))
 }

@@ -18,35 +18,29 @@ pub const SIGNIFICANCE: f64 = 0.01;
 /// that three seeds are the least. The standard error is that of one more value beside n: s·√(1 + 1/n).
 pub fn measure(findings: &mut [Finding], between: &[Vec<Finding>]) {
     for found in findings {
-        let is_same = |other: &&Finding| other.rule.gate == found.rule.gate && other.item == found.item;
+        let is_same = |other: &&Finding| (&other.gate.name, &other.gate.item) == (&found.gate.name, &found.gate.item);
         let others: Option<Vec<&Finding>> = between.iter().map(|all| all.iter().find(is_same)).collect();
         let Some(others) = others else { continue };
         let sample: Option<Vec<f64>> = match found.rule.how {
-            How::Pair => others.iter().map(|other| other.value).collect(),
-            _ => std::iter::once(found.base).chain(others.iter().map(|other| other.candidate)).collect(),
+            How::Pair => others.iter().map(|other| other.gate.value).collect(),
+            _ => std::iter::once(found.gate.base).chain(others.iter().map(|other| other.gate.candidate)).collect(),
         };
         let Some(mut sample) = sample else { continue };
         if found.rule.how != How::Pair {
-            let mean = moments(&sample).mean();
+            let mean = sample.iter().copied().collect::<Moments>().mean();
             let values: Option<Vec<f64>> = sample.iter().map(|value| found.rule.how.value(mean, *value)).collect();
             let Some(values) = values else { continue };
             sample = values;
-            found.base = Some(mean);
-            found.value = found.candidate.and_then(|candidate| found.rule.how.value(mean, candidate));
+            found.gate.base = Some(mean);
+            found.gate.value = found.gate.candidate.and_then(|candidate| found.rule.how.value(mean, candidate));
         }
-        let (moments, n) = (moments(&sample), sample.len() as f64);
+        let (moments, n) = (sample.iter().copied().collect::<Moments>(), sample.len() as f64);
         if n >= 2.0 {
             found.noise = (found.rule.how == How::Pair).then(|| moments.mean());
-            found.standard_error = Some((moments.variance() * n / (n - 1.0) * (1.0 + 1.0 / n)).sqrt());
+            found.gate.standard_error = Some((moments.variance() * n / (n - 1.0) * (1.0 + 1.0 / n)).sqrt());
             found.freedom = Some(n - 1.0);
         }
     }
-}
-
-fn moments(sample: &[f64]) -> Moments {
-    let mut moments = Moments::default();
-    sample.iter().for_each(|value| moments.add(*value, 1.0));
-    moments
 }
 
 /// Turns measured spreads into bounds at [`SIGNIFICANCE`], by Student's t.
@@ -55,7 +49,7 @@ pub fn bound(findings: &mut [Finding]) {
     let level = 1.0 - 0.5 * SIGNIFICANCE / gates.max(1) as f64;
     for found in findings {
         let Some(student) = found.freedom.and_then(|freedom| StudentsT::new(0.0, 1.0, freedom).ok()) else { continue };
-        let spread = found.standard_error.map(|error| student.inverse_cdf(level) * error);
+        let spread = found.gate.standard_error.map(|error| student.inverse_cdf(level) * error);
         found.noise = spread.map(|spread| found.noise.unwrap_or(0.0) + spread);
     }
 }
@@ -78,20 +72,21 @@ mod tests {
         let between = [of_image(1.0, 1.1, 4.0), of_image(1.0, 0.9, 6.0)];
         let mut found = of_image(1.0, 1.5, 9.0);
         measure(&mut found, &between);
-        let of = |gate: &str| found.iter().find(|f| f.rule.gate == gate).cloned().unwrap();
+        let of = |gate: &str| found.iter().find(|f| f.gate.name == gate).cloned().unwrap();
         // Three seeds with means 1, 1.1, 0.9: deviation 10 %, and that of one more beside their mean √(4/3) of it.
         let mean = of("image.mean");
-        assert!((mean.value.unwrap() - 50.0).abs() < 1e-9 && (mean.base.unwrap() - 1.0).abs() < 1e-12);
+        assert!((mean.gate.value.unwrap() - 50.0).abs() < 1e-9 && (mean.gate.base.unwrap() - 1.0).abs() < 1e-12);
         assert!(
-            (mean.standard_error.unwrap() - 10.0 * (4.0_f64 / 3.0).sqrt()).abs() < 1e-9 && mean.freedom == Some(2.0)
+            (mean.gate.standard_error.unwrap() - 10.0 * (4.0_f64 / 3.0).sqrt()).abs() < 1e-9
+                && mean.freedom == Some(2.0)
         );
         // Two pairs of seeds with 4 and 6 %.
         let rmse = of("image.rmse");
-        assert!((rmse.standard_error.unwrap() - 3.0_f64.sqrt()).abs() < 1e-9 && rmse.freedom == Some(1.0));
+        assert!((rmse.gate.standard_error.unwrap() - 3.0_f64.sqrt()).abs() < 1e-9 && rmse.freedom == Some(1.0));
         bound(&mut found);
         // Of two gates each has 0.5 %, two-sided 0.25 %. Tables: t = 14.09 with two degrees of freedom, 127.3 with one.
-        let bound = |gate: &str| found.iter().find(|f| f.rule.gate == gate).unwrap().noise.unwrap();
-        assert!((bound("image.mean") / (14.09 * mean.standard_error.unwrap()) - 1.0).abs() < 1e-3);
+        let bound = |gate: &str| found.iter().find(|f| f.gate.name == gate).unwrap().noise.unwrap();
+        assert!((bound("image.mean") / (14.09 * mean.gate.standard_error.unwrap()) - 1.0).abs() < 1e-3);
         assert!((bound("image.rmse") / (5.0 + 127.3 * 3.0_f64.sqrt()) - 1.0).abs() < 1e-3);
     }
 

@@ -82,16 +82,6 @@ pub struct ProbesReport {
     pub distance_differences_m: Vec<f32>,
 }
 
-/// The region of the volume whose mean irradiance changed most.
-struct Region {
-    /// Centre of its probes, world space, to the centimetre.
-    place_m: [f64; 3],
-    base: f64,
-    candidate: f64,
-    /// Of the base's, by size; infinite where that is dark.
-    percent: f64,
-}
-
 /// Probes of the same grid point, base and candidate.
 fn matches(base: &Volume, candidate: &Volume) -> Vec<(ProbeIndex, ProbeIndex)> {
     let (grid, other) = (&base.grid, &candidate.grid);
@@ -172,7 +162,6 @@ pub fn compare(item: &str, base: &Path, candidate: &Path) -> Result<ProbesReport
     let lit = rows.iter().filter(|r| r.irradiance_base > floor);
     let distances: Vec<f32> = rows.iter().filter_map(|r| r.distance_difference_m).map(|d| d as f32).collect();
     let distance = root_mean_square(distances.iter().map(|d| f64::from(*d))) / f64::from(spacing);
-    let region = region.as_ref();
     let figures = json!({
         "probes_base": base.states.len(),
         "probes_candidate": candidate.states.len(),
@@ -194,10 +183,10 @@ pub fn compare(item: &str, base: &Path, candidate: &Path) -> Result<ProbesReport
         // Root mean square of `distance_difference_m` ÷ spacing.
         "distance_percent": (!distances.is_empty()).then_some(100.0 * distance),
         // The region that changed most; no percentage where its base is dark.
-        "region_place_m": region.map(|region| region.place_m),
-        "region_base": region.map(|region| region.base),
-        "region_candidate": region.map(|region| region.candidate),
-        "region_percent": region.map(|region| region.percent),
+        "region_place_m": region.map(|(place_m, _)| place_m),
+        "region_base": region.map(|(_, figures)| figures[1]),
+        "region_candidate": region.map(|(_, figures)| figures[2]),
+        "region_percent": region.map(|(_, figures)| figures[0]),
     });
     Ok(ProbesReport {
         item: item.to_owned(),
@@ -208,8 +197,10 @@ pub fn compare(item: &str, base: &Path, candidate: &Path) -> Result<ProbesReport
     })
 }
 
-/// `scale`: mean irradiance. `None` where no region has enough light and probes.
-fn worst_region(volume: &Volume, rows: &[ProbeRow], scale: f64) -> Option<Region> {
+/// Of the region of the volume whose mean irradiance changed most: the centre of its probes, world space, to the centimetre; by how
+/// many percent of the base's (infinite where that is dark), base and candidate. `scale`: mean irradiance. `None` where no region has
+/// enough light and probes.
+fn worst_region(volume: &Volume, rows: &[ProbeRow], scale: f64) -> Option<([f64; 3], [f64; 3])> {
     let mut members: BTreeMap<[u32; 3], Vec<&ProbeRow>> = BTreeMap::new();
     for row in rows {
         let coordinate = volume.grid.coordinate(ProbeIndex(row.index as u32));
@@ -223,7 +214,7 @@ fn worst_region(volume: &Volume, rows: &[ProbeRow], scale: f64) -> Option<Region
         let place_m = ((place * 100.0).round() / 100.0).to_array();
         let percent = 100.0 * (candidate / base - 1.0).abs();
         let is_judged = rows.len() >= MIN_REGION && base.max(candidate) > DARK_REGION * scale;
-        is_judged.then_some(Region { place_m, base, candidate, percent })
+        is_judged.then_some((place_m, [percent, base, candidate]))
     };
-    members.values().filter_map(region).max_by(|a, b| a.percent.total_cmp(&b.percent))
+    members.values().filter_map(region).max_by(|a, b| a.1[0].total_cmp(&b.1[0]))
 }

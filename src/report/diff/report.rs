@@ -50,8 +50,8 @@ pub struct DiffReport {
     /// Items that only the candidate, or only the base has.
     pub added: Vec<String>,
     pub missing: Vec<String>,
-    /// Keys of the configuration that differ.
-    pub config_changes: Vec<ConfigChange>,
+    /// Keys of the configuration that differ; `null` where they cannot be compared.
+    pub config_changes: Option<Vec<ConfigChange>>,
     pub thresholds: Thresholds,
     pub notes: Vec<String>,
     /// What gives this report again: the comparison, then what made its sides, as far as their reports tell.

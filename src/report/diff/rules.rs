@@ -6,6 +6,7 @@ use std::sync::LazyLock;
 use serde::Deserialize;
 
 use super::figures::{Facts, Seeds, join};
+use crate::report::gate::Gate;
 use crate::system::format;
 
 static RULES: LazyLock<Vec<Rule>> = LazyLock::new(|| {
@@ -66,12 +67,8 @@ impl How {
 #[derive(Debug, Clone)]
 pub struct Finding {
     pub rule: &'static Rule,
-    pub item: String,
-    pub base: Option<f64>,
-    pub candidate: Option<f64>,
-    /// In the rule's unit. More is worse; with [`How::Change`] less is too.
-    pub value: Option<f64>,
-    pub standard_error: Option<f64>,
+    /// Not judged yet. Of its value more is worse; with [`How::Change`] less is too.
+    pub gate: Gate,
     /// Degrees of freedom of the standard error, where it comes of few seeds.
     pub freedom: Option<f64>,
     /// What noise may do by the measured spread of seeds; from [`super::noise::bound`].
@@ -79,7 +76,6 @@ pub struct Finding {
     pub seeds: Seeds,
     /// What limits of 1 allow: `relative`, and `other_seeds`.
     pub scales: [f64; 2],
-    pub explanation: String,
 }
 
 /// All findings about an item of this kind. `pair`: of the comparison of the two.
@@ -136,18 +132,16 @@ impl Rule {
             let [a, b, c, d] = [least[0], most[0], least[1], most[1]].map(|number| format::significant(number, 4));
             explanation += &format!(" Over the runs: base {a} to {b}, candidate {c} to {d}.");
         }
+        let item = join(item, if self.of == "*" { label } else { &self.of });
+        let (name, unit) = (self.gate.clone(), self.unit.as_str());
+        let gate = Gate { name, item, base, candidate, value, unit, standard_error, explanation, ..Gate::default() };
         Some(Finding {
             rule: self,
-            item: join(item, if self.of == "*" { label } else { &self.of }),
-            base,
-            candidate,
-            value,
-            standard_error,
+            gate,
             freedom: freedom.filter(|_| standard_error.is_some()),
             noise: None,
             seeds,
             scales: [scale, whole.unwrap_or(scale)],
-            explanation,
         })
     }
 }

@@ -1,16 +1,14 @@
-//! What the page gets of a comparison.
+//! The page of a comparison: its report as it is, with what only a page has.
 
-use std::borrow::Cow;
+use minijinja::value::Serde;
+use minijinja::{Value, context};
 
-use serde_json::Value;
-
-use super::figures::{self, Facts};
+use super::figures::Facts;
 use super::images::Layer;
-use super::probes::{self, ProbesReport};
-use super::report::{DiffReport, SideReport};
-use crate::report::page::{
-    Figure, FigureTable, Histogram, PackedImage, Page, PageError, PageImage, Plot, ProbeComparison, ProbeRow, Side,
-};
+use super::probes::ProbesReport;
+use super::report::DiffReport;
+use crate::report::heatmap::range_of;
+use crate::report::page::{self, PackedImage, PageError, PairPixels, histogram};
 
 /// Name, place and unit of figures that the page lists. `{}` stands for the unit of the pixels, for which there is no room in every
 /// column.
@@ -39,124 +37,56 @@ const OF_PROBES: &[[&str; 3]] = &[
     ["compared: active on both sides", "compared", ""],
 ];
 
-/// A comparison's parts that only the page shows.
-#[derive(Debug, Default)]
-pub struct Shown {
-    /// In the order of the report's images.
-    pub images: Vec<PackedImage>,
-    pub plots: Vec<Plot>,
-}
-
-/// The page of a comparison.
-pub fn page(report: &DiffReport, shown: Shown) -> Page<'_> {
-    Page {
-        title: format!("{} against {}", report.candidate.path, report.base.path),
-        sides: [side(&report.base), side(&report.candidate)],
-        gates: &report.gates,
-        images: shown.images,
-        probes: report.probes.iter().map(probe_comparison).collect(),
-        figures: tables(&report.figures),
-        plots: shown.plots,
-        added: report.added.clone(),
-        missing: report.missing.clone(),
-        commands: &report.commands,
-        config_changes: report
-            .base
-            .config
-            .as_ref()
-            .and(report.candidate.config.as_ref())
-            .map(|_| &report.config_changes),
-        notes: report.notes.clone(),
-    }
-}
-
-fn side(side: &SideReport) -> Side {
-    let SideReport { path, kind, seed, scene_blake3, .. } = side.clone();
-    Side { path, kind, seed, scene_blake3 }
+/// The page as HTML. `images` are in the order of the report's; `plots` are those of sweeps.
+///
+/// # Errors
+/// Those of [`page::render`].
+pub fn page(report: &DiffReport, images: Vec<PackedImage>, plots: Vec<Value>) -> Result<String, PageError> {
+    let probes: Vec<Value> = report.probes.iter().map(probes).collect();
+    let view = context! { probes, plots, ..Value::from(Serde(report)) };
+    page::render(view, &report.gates, images)
 }
 
 /// One pair of pictures of at most `pairs`.
 pub fn image(layer: &Layer, pairs: usize) -> Result<PackedImage, PageError> {
-    let (report, [quantity, unit]) = (&layer.report, layer.quantity);
-    let image = PageImage {
-        name: if report.item.is_empty() { report.layer.clone() } else { report.item.clone() },
-        quantity: quantity.to_owned(),
-        unit: unit.to_owned(),
-        width: report.width,
-        height: report.height,
-        base: Cow::Borrowed(&layer.base.pixels),
-        candidate: Cow::Borrowed(&layer.candidate.pixels),
-        exposure_ev: report.exposure_ev.unwrap_or(0.0),
-        is_display_referred: report.is_display,
+    let report = &layer.report;
+    let pair = PairPixels {
+        name: if report.item.is_empty() { &report.layer } else { &report.item },
+        unit: report.unit,
+        base: &layer.base,
+        candidate: &layer.candidate,
+        difference: &layer.difference,
+        exposure_ev: report.exposure_ev,
         is_judged: report.judged,
-        is_compared: Some(&layer.used),
-        figures: listed(&report.figures, OF_IMAGES, unit),
-        worst_pixel: layer.worst,
     };
-    PackedImage::new(&image, pairs)
+    let figures = listed(&report.figures, OF_IMAGES, report.unit);
+    PackedImage::new(&pair, context! { figures, ..Value::from(Serde(report)) }, pairs)
 }
 
 /// The figures of a comparison that a table names, as far as it has them.
-fn listed(figures: &Value, table: &[[&str; 3]], unit_of_pixels: &str) -> Vec<Figure> {
+fn listed(figures: &serde_json::Value, table: &[[&str; 3]], unit_of_pixels: &str) -> Vec<Value> {
     let facts = Facts::of(figures);
     let unit_of_pixels = if unit_of_pixels.is_empty() { String::new() } else { format!(", {unit_of_pixels}") };
     let figure = |[name, place, unit]: &[&str; 3]| {
         let [base, candidate] = ["base", "candidate"].map(|side| facts.number(&format!("{place}_{side}")));
         let difference = base.zip(candidate).map(|(base, candidate)| candidate - base);
-        let name = name.replace("{}", &unit_of_pixels);
-        let value = facts.number(place).or(difference);
-        Figure { name, base, candidate, value, standard_error: None, unit: (*unit).to_owned() }
+        let (name, difference) = (name.replace("{}", &unit_of_pixels), facts.number(place).or(difference));
+        context! { name, base, candidate, difference, unit => *unit }
     };
     let is_there = |[_, place, _]: &&[&str; 3]| !place.starts_with("flip.") || facts.get(place).is_some();
     table.iter().filter(is_there).map(figure).collect()
 }
 
-fn probe_comparison(report: &ProbesReport) -> ProbeComparison {
-    let histogram = |title: &str, unit: &str, values: &[f32]| Histogram {
-        title: title.to_owned(),
-        unit: unit.to_owned(),
-        what: "probes".to_owned(),
-        values: values.to_vec(),
-    };
-    let mut histograms = vec![
-        histogram("Change of mean irradiance, lit probes", "%", &report.changes_percent),
-        histogram("Difference of stored distances, root mean square", "m", &report.distance_differences_m),
+fn probes(report: &ProbesReport) -> Value {
+    let drawn = [
+        ("Change of mean irradiance, lit probes", "%", &report.changes_percent),
+        ("Difference of stored distances, root mean square", "m", &report.distance_differences_m),
     ];
-    histograms.retain(|histogram| !histogram.values.is_empty());
-    ProbeComparison {
-        name: if report.item.is_empty() { "Probe file".to_owned() } else { report.item.clone() },
-        figures: listed(&report.figures, OF_PROBES, ""),
-        worst: report.worst.iter().map(probe).collect(),
-        histograms,
+    let drawn = drawn.into_iter().filter(|(.., values)| !values.is_empty());
+    let histograms = drawn.map(|(title, unit, values)| histogram(title, values, range_of(values), unit, "probes"));
+    context! {
+        figures => listed(&report.figures, OF_PROBES, ""),
+        histograms => histograms.collect::<Vec<_>>(),
+        ..Value::from(Serde(report))
     }
-}
-
-fn probe(row: &probes::ProbeRow) -> ProbeRow {
-    // The states have their names in reports.
-    let state = |state| match serde_json::to_value(state) {
-        Ok(Value::String(name)) => name.replace('_', " "),
-        _ => String::new(),
-    };
-    ProbeRow {
-        index: row.index as u64,
-        position_m: row.position_m,
-        irradiance: Some(row.irradiance_difference_relative),
-        distance_m: row.distance_difference_m,
-        base_state: state(row.state_base),
-        candidate_state: state(row.state_candidate),
-        moved_m: Some(row.moved_m),
-    }
-}
-
-/// Figures of reports, a table for each item.
-fn tables(all: &[figures::Figure]) -> Vec<FigureTable> {
-    let row = |figure: &figures::Figure| {
-        let figures::Figure { name, base, candidate, difference: value, .. } = figure.clone();
-        Figure { name, base, candidate, value, ..Figure::default() }
-    };
-    let table = |figures: &[figures::Figure]| {
-        let title = if figures[0].item.is_empty() { "Report".to_owned() } else { figures[0].item.clone() };
-        FigureTable { title, figures: figures.iter().map(row).collect() }
-    };
-    all.chunk_by(|a, b| a.item == b.item).map(table).collect()
 }

@@ -22,9 +22,6 @@ const FOLDER_REPORTS: [(&str, Kind); 2] = [("report.json", Kind::Render), ("swee
 /// Folders deeper than this are no results, but links in a circle.
 const MAX_DEPTH: usize = 8;
 
-/// Reports are some kilobytes; sweeps of many configurations a megabyte.
-const MAX_REPORT_BYTES: u64 = 64 << 20;
-
 /// What can be compared with its like.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Item {
@@ -177,13 +174,9 @@ fn extension(path: &Path) -> String {
 }
 
 fn read_json(path: &Path) -> Result<Value, DiffError> {
-    let damaged = |what: String| DiffError::file(path, format!("is damaged or no report: {what}; make it again"));
-    let bytes = fs::metadata(path).map_err(|cause| unreadable(path, &cause))?.len();
-    if bytes > MAX_REPORT_BYTES {
-        return Err(damaged(format!("{bytes} bytes")));
-    }
     let text = read_file(path).map_err(|cause| unreadable(path, &cause))?;
-    serde_json::from_slice(&text).map_err(|cause| damaged(cause.to_string()))
+    let damaged = |cause| DiffError::file(path, format!("is damaged or no report: {cause}; make it again"));
+    serde_json::from_slice(&text).map_err(damaged)
 }
 
 /// What a probe file says of itself, in the words of reports.

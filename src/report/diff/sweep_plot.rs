@@ -1,16 +1,16 @@
 //! Error against bake time of two sweeps in one picture.
 
+use minijinja::context;
 use serde_json::Value;
 
-use super::figures::{join, number};
-use crate::report::page::Plot;
+use super::figures::join;
 use crate::report::plot::{Chart, Mark, Series};
 
 /// Relative errors are drawn in percent.
 const PERCENT: f64 = 100.0;
 
 /// The ladders of both sides; `None` where no configuration has both time and error.
-pub(super) fn plot(item: &str, base: &Value, candidate: &Value) -> Option<Plot> {
+pub(super) fn plot(item: &str, base: &Value, candidate: &Value) -> Option<minijinja::Value> {
     let series: Vec<Series> =
         [(base, "base"), (candidate, "candidate")].iter().flat_map(|(report, side)| ladders(report, side)).collect();
     if series.iter().all(|series| series.marks.is_empty()) {
@@ -25,7 +25,7 @@ pub(super) fn plot(item: &str, base: &Value, candidate: &Value) -> Option<Plot> 
         series,
         guides: Vec::new(),
     };
-    Some(Plot { title, svg: chart.svg() })
+    Some(context! { title, svg => chart.svg() })
 }
 
 fn ladders(report: &Value, side: &str) -> Vec<Series> {
@@ -46,7 +46,7 @@ fn ladders(report: &Value, side: &str) -> Vec<Series> {
 
 fn mark(configuration: &Value) -> Option<Mark> {
     let along = |figure: &str, factor: f64| {
-        let of = |part: &str| Some(factor * number(configuration, &format!("figures.{figure}.{part}"))?);
+        let of = |part: &str| Some(factor * configuration["figures"][figure][part].as_f64()?);
         let mean = of("mean")?;
         Some((mean, [of("min").unwrap_or(mean), of("max").unwrap_or(mean)]))
     };
@@ -76,7 +76,8 @@ mod tests {
         let mark = found[0].marks[1];
         assert_eq!((mark.x, mark.y, mark.x_bar, mark.y_bar, mark.on_front), (4.0, 2.0, [4.0, 8.0], [2.0, 2.0], true));
         let plot = plot("", &sweep(0.02), &sweep(0.03)).unwrap();
-        assert!(plot.svg.contains("moments, base") && plot.svg.contains("moments, candidate"));
+        let svg = plot.get_attr("svg").unwrap().to_string();
+        assert!(svg.contains("moments, base") && svg.contains("moments, candidate"));
         assert!(super::plot("", &json!({}), &json!({"configurations": []})).is_none());
     }
 }

@@ -45,22 +45,18 @@ pub struct Exception {
     pub limit: Limit,
 }
 
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+/// The thresholds in effect, or those of a file.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-struct File {
-    gates: BTreeMap<String, Limit>,
-    exceptions: Vec<Exception>,
-}
-
-/// The thresholds in effect.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Thresholds {
     pub gates: BTreeMap<String, Limit>,
     /// The last that fits holds.
     pub exceptions: Vec<Exception>,
     /// Where each gate's limit comes from, where that is not the default.
+    #[serde(skip_deserializing)]
     sources: BTreeMap<String, String>,
     /// What exceptions come from.
+    #[serde(skip_deserializing)]
     file: Option<String>,
 }
 
@@ -70,8 +66,7 @@ impl Thresholds {
     /// # Errors
     /// A file that cannot be read, and what is no threshold in it.
     pub fn load(path: Option<&Path>) -> Result<Thresholds, DiffError> {
-        let File { gates, exceptions } = parse(DEFAULTS, "configs/diff.ron")?;
-        let mut thresholds = Thresholds { gates, exceptions, sources: BTreeMap::new(), file: None };
+        let mut thresholds = parse(DEFAULTS, "configs/diff.ron")?;
         if let Some(path) = path {
             let text = read_file(path).and_then(|bytes| String::from_utf8(bytes).map_err(std::io::Error::other));
             let remedy = "give the path of a RON file such as configs/diff.ron";
@@ -125,11 +120,11 @@ impl Thresholds {
 
     /// Holds a finding against its limit.
     pub fn judge(&self, found: Finding) -> Gate {
-        let (limit, source) = self.limit(&found.rule.gate, &found.item);
+        let (limit, source) = self.limit(&found.gate.name, &found.gate.item);
         let is_judged = limit != Limit::default();
         // What noise may do is measured, or bounded where the seeds are others; the smaller of both.
         let of_noise = limit.other_seeds.filter(|_| found.seeds == Seeds::Other).map(|share| share * found.scales[1]);
-        let known_error = found.standard_error.filter(|_| found.freedom.is_none());
+        let known_error = found.gate.standard_error.filter(|_| found.freedom.is_none());
         let bounds = [
             limit.absolute,
             limit.relative.map(|share| share * found.scales[0]),
@@ -137,12 +132,12 @@ impl Thresholds {
             of_noise.into_iter().chain(found.noise).reduce(f64::min),
         ];
         let threshold = is_judged.then(|| bounds.into_iter().flatten().fold(0.0, f64::max));
-        let value = found.value.filter(|value| value.is_finite());
+        let value = found.gate.value.filter(|value| value.is_finite());
         let against = value.map(|value| if found.rule.how == How::Change { value.abs() } else { value });
         let passed = match (against, threshold) {
             (_, None) => true,
             (Some(against), Some(threshold)) => against <= threshold,
-            (None, Some(_)) => found.base.is_none() && found.candidate.is_none(),
+            (None, Some(_)) => found.gate.base.is_none() && found.gate.candidate.is_none(),
         };
         let margin = against.zip(threshold).map(|(against, threshold)| match threshold {
             _ if against <= 0.0 => 1.0,
@@ -150,29 +145,15 @@ impl Thresholds {
             0.0 => -1.0 - against,
             _ => 1.0 - against / threshold,
         });
-        Gate {
-            name: found.rule.gate.clone(),
-            item: found.item,
-            base: found.base,
-            candidate: found.candidate,
-            value,
-            unit: &found.rule.unit,
-            threshold,
-            margin,
-            standard_error: found.standard_error,
-            passed,
-            waived: false,
-            source,
-            explanation: found.explanation,
-        }
+        Gate { value, threshold, margin, passed, source, ..found.gate }
     }
 }
 
-fn parse(text: &str, place: &str) -> Result<File, DiffError> {
+fn parse(text: &str, place: &str) -> Result<Thresholds, DiffError> {
     let text = text.trim_start_matches('\u{feff}');
     crate::config::ron_options().from_str(text).map_err(|e| {
         let what = match e.code {
-            ron::Error::ExpectedNamedStructLike("File") if !text.trim().is_empty() => {
+            ron::Error::ExpectedNamedStructLike("Thresholds") if !text.trim().is_empty() => {
                 "the keys stand in parentheses, as in (gates: { \"leak.light\": (absolute: 0.01) })".to_owned()
             }
             _ => messages::of_file(&e, text),
@@ -241,7 +222,10 @@ mod tests {
         let gate = thresholds.judge(changed(-0.9));
         assert!(gate.passed && gate.threshold == Some(1.0) && gate.source == "a.ron: gates.image.mean");
         assert!((gate.margin.unwrap() - 0.1).abs() < 1e-9);
-        let with_error = |error: f64| Finding { standard_error: Some(error), ..changed(-1.1) };
+        let with_error = |error: f64| {
+            let found = changed(-1.1);
+            Finding { gate: Gate { standard_error: Some(error), ..found.gate.clone() }, ..found }
+        };
         assert!(!thresholds.judge(with_error(0.1)).passed);
         assert_eq!(thresholds.judge(with_error(0.5)).threshold, Some(2.0));
         // Between other seeds the measured noise, but not more than the wide bound.
@@ -256,7 +240,9 @@ mod tests {
         let gate = thresholds().judge(image_mean(0.0, 1.0));
         assert!(!gate.passed && gate.value.is_none() && gate.margin.is_none());
         assert!(thresholds().judge(image_mean(0.0, 0.0)).passed);
-        assert!(!thresholds().judge(Finding { value: Some(f64::NAN), ..changed(0.0) }).passed);
+        let mut undefined = changed(0.0);
+        undefined.gate.value = Some(f64::NAN);
+        assert!(!thresholds().judge(undefined).passed);
     }
 
     #[test]
@@ -282,7 +268,9 @@ mod tests {
         let text = r#"(exceptions: [(item: "dark/*", gate: "image.*", limit: (absolute: 70))])"#;
         thresholds.put(text, "a.ron").unwrap();
         assert!(!thresholds.judge(changed(60.0)).passed);
-        let gate = thresholds.judge(Finding { item: "dark/visibility_on".into(), ..changed(60.0) });
+        let mut found = changed(60.0);
+        found.gate.item = "dark/visibility_on".into();
+        let gate = thresholds.judge(found);
         assert!(gate.passed && gate.source.starts_with("a.ron: exceptions"), "{gate:?}");
     }
 

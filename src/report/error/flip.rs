@@ -38,12 +38,8 @@ pub struct Flip {
     pub standard_error: Option<f64>,
 }
 
-/// FLIP of the three parts of a picture.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Flips {
-    /// All pixels (also those without a surface), the corners, and the flat parts.
-    pub parts: [Flip; 3],
-}
+/// FLIP of the three parts of a picture: all pixels (also those without a surface), the corners, and the flat parts.
+pub type Flips = [Flip; 3];
 
 /// FLIP between the beauty of the reference and `beauty`, both tone-mapped at this exposure.
 ///
@@ -60,7 +56,7 @@ pub fn measure(
     let means = |other: &Picture| part_means(&flip_map(&other.tonemapped(exposure_ev), &shown), regions);
     let measured = means(&reference.beauty);
     let Some(variance) = &reference.beauty_variance else {
-        return Flips { parts: measured.map(|mean| Flip { mean, standard_error: None }) };
+        return measured.map(|mean| Flip { mean, standard_error: None });
     };
     let stand_in = shrunk(&reference.beauty, beauty, variance);
     let without = means(&stand_in);
@@ -70,7 +66,7 @@ pub fn measure(
         let shifts = |without: f64| with.iter().filter_map(|m| m[part]).map(|m| m - without).collect::<Vec<f64>>();
         Some(corrected(measured[part]?, &shifts(without[part]?)))
     };
-    Flips { parts: [0, 1, 2].map(|i| part(i).unwrap_or_default()) }
+    [0, 1, 2].map(|i| part(i).unwrap_or_default())
 }
 
 /// The measured mean minus the mean shift. `shifts` holds the shift of each replicate.
@@ -112,18 +108,18 @@ pub fn flip_map(reference: &Picture8, shown: &Picture8) -> Vec<f32> {
     nv_flip::flip(image(reference), image(shown), DEFAULT_PIXELS_PER_DEGREE).to_vec()
 }
 
-/// Means of a map over the parts of [`Flips::parts`].
+/// Means of a map over the parts of [`Flips`].
 fn part_means(map: &[f32], regions: &[Option<Region>]) -> [Option<f64>; 3] {
     assert_eq!(map.len(), regions.len(), "pixels of the regions");
-    let mean = |shown: &dyn Fn(Option<Region>) -> bool| {
-        let (mut sum, mut count) = (0.0, 0.0f64);
-        for (value, _) in map.iter().zip(regions).filter(|(_, region)| shown(**region)) {
-            sum += f64::from(*value);
-            count += 1.0;
+    let mut sums = [(0.0, 0.0f64); 3];
+    for (value, region) in map.iter().zip(regions) {
+        let part = region.map(|region| if region == Region::Corner { 1 } else { 2 });
+        for part in std::iter::once(0).chain(part) {
+            sums[part].0 += f64::from(*value);
+            sums[part].1 += 1.0;
         }
-        (count > 0.0).then(|| sum / count)
-    };
-    [mean(&|_| true), mean(&|r| r == Some(Region::Corner)), mean(&|r| r == Some(Region::Flat))]
+    }
+    sums.map(|(sum, count)| (count > 0.0).then(|| sum / count))
 }
 
 /// The picture plus normal noise of this variance. All channels of a pixel deviate by the same number of standard

@@ -36,7 +36,7 @@ use serde::{Deserialize, Serialize};
 
 use super::reference_layers::ReferenceLayers;
 use crate::shade::regions::Region;
-use pooled::{Pooled, Terms};
+use pooled::Pooled;
 use terms::{FOLD_UNCERTAINTY, fold, is_continued, relative_square};
 use window::window_means;
 
@@ -71,7 +71,7 @@ pub struct Figures {
 }
 
 /// The figures of one part of the picture: all of it or one region.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ErrorEstimate {
     pub pixels: usize,
     #[serde(flatten)]
@@ -109,12 +109,8 @@ pub struct ByRegion {
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     pixels: usize,
-    bias: Pooled,
-    absolute: Pooled,
-    over: Pooled,
-    under: Pooled,
-    square: Pooled,
-    relative: Pooled,
+    /// `bias`, `mae`, `over`, `under`, squared errors, `relmse`; the last is not finite where ε is 0.
+    pooled: [Pooled; 6],
     /// Sum of the corrections [`fold`].
     fold: f64,
     /// Sum of the uncertainties of relative squares: a share of the correction, or the whole term where the noise is as
@@ -139,8 +135,7 @@ pub fn measure(
     assert_eq!(regions.len(), reference.irradiance.len(), "pixels of the regions");
     let usable = |i: usize| regions[i].is_some() && irradiance[i].is_finite() && reference.is_finite(i);
     let mask: Vec<bool> = (0..irradiance.len()).map(usable).collect();
-    let (epsilon, peak) = scale(reference, &mask);
-    let peak_error = peak_error(reference, &mask, peak);
+    let scale = Scale::of(reference, &mask);
     let around = look_around(reference, irradiance, &mask);
 
     // The whole picture, corners, flat parts.
@@ -148,18 +143,18 @@ pub fn measure(
     for i in (0..irradiance.len()).filter(|&i| mask[i]) {
         let part = if regions[i] == Some(Region::Corner) { 1 } else { 2 };
         for s in [0, part] {
-            sums[s].add(reference, i, irradiance[i], around.as_ref().map(|a| &a[i]), epsilon);
+            sums[s].add(reference, i, irradiance[i], around.as_ref().map(|a| &a[i]), scale.epsilon);
         }
     }
     let finish = |part: usize| {
-        let flip = flips.map(|f| f.parts[part]).unwrap_or_default();
-        sums[part].finish(reference.noise.is_some(), epsilon, (peak, peak_error), flip)
+        let flip = flips.map(|f| f[part]).unwrap_or_default();
+        sums[part].finish(reference.noise.is_some(), &scale, flip)
     };
     ErrorReport {
         all: finish(0),
         by_region: ByRegion { corner: finish(1), flat: finish(2) },
-        relmse_epsilon: epsilon,
-        psnr_peak: peak,
+        relmse_epsilon: scale.epsilon,
+        psnr_peak: scale.peak,
         pixels_not_finite: (0..mask.len()).filter(|&i| regions[i].is_some() && !mask[i]).count(),
     }
 }
@@ -168,39 +163,37 @@ pub fn measure(
 /// equal values by 3.7 standard errors. Few pixels compete for the peak, so the excess is smaller.
 const PEAK_SIGMAS: f64 = 3.0;
 
-/// Uncertainty of the peak, W·m⁻², from the noise of the pixel and channel in which it was found.
-fn peak_error(reference: &ReferenceLayers, mask: &[bool], peak: f64) -> f64 {
-    let Some(noise) = &reference.noise else { return 0.0 };
-    let channels = (0..mask.len()).filter(|&i| mask[i]).flat_map(|i| [0, 1, 2].map(|c| (i, c)));
-    let mut at_peak = channels.filter(|&(i, c)| f64::from(reference.irradiance[i][c]) == peak);
-    at_peak.next().map_or(0.0, |(i, c)| PEAK_SIGMAS * noise.between(i, c, c).sqrt())
+/// What the figures of all parts refer to.
+#[derive(Debug, Clone, Copy)]
+struct Scale {
+    /// ε of `relmse`. It is taken as exact, because the noise of a mean over all pixels is negligible.
+    epsilon: f64,
+    /// Of `psnr_db`, W·m⁻².
+    peak: f64,
+    /// Uncertainty of the peak, W·m⁻², from the noise of the pixel and channel in which it was found.
+    peak_error: f64,
 }
 
-/// ε of `relmse` and the peak of `psnr_db`. ε is taken as exact, because the noise of a mean over all pixels is
-/// negligible.
-fn scale(reference: &ReferenceLayers, mask: &[bool]) -> (f64, f64) {
-    let (mut sum, mut count, mut peak) = (0.0, 0.0f64, 0.0f64);
-    for (pixel, _) in reference.irradiance.iter().zip(mask).filter(|(_, used)| **used) {
-        for channel in pixel.to_array().map(f64::from) {
+impl Scale {
+    fn of(reference: &ReferenceLayers, mask: &[bool]) -> Scale {
+        let (mut sum, mut count, mut peak, mut peak_error) = (0.0, 0.0f64, 0.0, 0.0);
+        for (i, c) in (0..mask.len()).filter(|&i| mask[i]).flat_map(|i| [0, 1, 2].map(|c| (i, c))) {
+            let channel = f64::from(reference.irradiance[i][c]);
             sum += channel;
             count += 1.0;
-            peak = peak.max(channel);
+            if channel > peak {
+                peak = channel;
+                peak_error = reference.noise.as_ref().map_or(0.0, |n| PEAK_SIGMAS * n.between(i, c, c).sqrt());
+            }
         }
+        let mean = sum / count.max(1.0);
+        Scale { epsilon: RELATIVE_FLOOR * mean * mean, peak, peak_error }
     }
-    let mean = sum / count.max(1.0);
-    (RELATIVE_FLOOR * mean * mean, peak)
 }
 
-/// Means over the neighbourhood of a pixel, per channel.
-#[derive(Debug, Clone, Copy)]
-struct Around {
-    /// Mean of d.
-    difference: [f64; 3],
-    /// Mean of v. The v of one pixel is itself an estimate, and a poor one if it comes from few blocks.
-    variance: [f64; 3],
-    /// Mean of r² − v, an estimate of t².
-    square: [f64; 3],
-}
+/// Means over the neighbourhood of a pixel, a row of three channels each: of d; of v, because the v of one pixel is
+/// itself an estimate, and a poor one if it comes from few blocks; of r² − v, an estimate of t².
+type Around = [f64; 9];
 
 /// The neighbourhood means of every pixel. `None` if the noise is not known.
 fn look_around(reference: &ReferenceLayers, irradiance: &[Vec3], mask: &[bool]) -> Option<Vec<Around>> {
@@ -211,9 +204,7 @@ fn look_around(reference: &ReferenceLayers, irradiance: &[Vec3], mask: &[bool]) 
         let (d, t) = (e - r, [0, 1, 2].map(|c| r[c] * r[c] - v[c]));
         [d.x, d.y, d.z, v[0], v[1], v[2], t[0], t[1], t[2]]
     };
-    let means = window_means(reference.width, reference.height, |i| mask[i], values);
-    let three = |m: &[f64; 9], from: usize| [m[from], m[from + 1], m[from + 2]];
-    Some(means.iter().map(|m| Around { difference: three(m, 0), variance: three(m, 3), square: three(m, 6) }).collect())
+    Some(window_means(reference.width, reference.height, |i| mask[i], values))
 }
 
 impl Sums {
@@ -222,63 +213,54 @@ impl Sums {
         let r = reference.irradiance[pixel].to_array().map(f64::from);
         let d = [0, 1, 2].map(|c| f64::from(value[c]) - r[c]);
         let v = [0, 1, 2].map(|c| noise.map_or(0.0, |(n, i)| n.between(i, c, c)));
-        let b = [0, 1, 2].map(|c| around.map_or(0.0, |a| fold(d[c], a.difference[c], a.variance[c])));
-        let mut add = |to: fn(&mut Sums) -> &mut Pooled, term: &dyn Fn(usize) -> (f64, f64, f64)| {
-            let t = [0, 1, 2].map(term);
-            let terms = Terms { value: t.map(|t| t.0), first: t.map(|t| t.1), second: t.map(|t| t.2) };
-            to(self).add(&terms, noise);
-        };
+        let b = [0, 1, 2].map(|c| around.map_or(0.0, |a| fold(d[c], a[c], a[3 + c])));
         // The derivative of max(0, ±d) is ±1 for one sign of d and 0 for the other.
         let is = |yes: bool| if yes { 1.0 } else { 0.0 };
-        add(|s| &mut s.bias, &|c| (d[c], -1.0, 0.0));
-        add(|s| &mut s.absolute, &|c| (d[c].abs() - b[c], -d[c].signum(), 0.0));
-        add(|s| &mut s.over, &|c| (d[c].max(0.0) - b[c] / 2.0, -is(d[c] > 0.0), 0.0));
-        add(|s| &mut s.under, &|c| ((-d[c]).max(0.0) - b[c] / 2.0, is(d[c] < 0.0), 0.0));
-        add(|s| &mut s.square, &|c| (d[c] * d[c] - v[c], -2.0 * d[c], 2.0));
-        if epsilon > 0.0 {
-            add(|s| &mut s.relative, &|c| relative_square(d[c], r[c], v[c], epsilon));
-            for c in 0..3 {
-                let known = around.is_none_or(|a| is_continued(a.variance[c], a.square[c], epsilon));
-                let w = r[c] * r[c] + epsilon;
-                self.doubtful += if v[c] == 0.0 {
-                    0.0
-                } else if known {
-                    let corrected = relative_square(d[c], r[c], v[c], epsilon).0;
-                    RELATIVE_UNCERTAINTY * (d[c] * d[c] / w - corrected).abs()
-                } else {
-                    (d[c] * d[c]).max(v[c]) / w
-                };
-            }
+        let terms = [0, 1, 2].map(|c| {
+            [
+                (d[c], -1.0, 0.0),
+                (d[c].abs() - b[c], -d[c].signum(), 0.0),
+                (d[c].max(0.0) - b[c] / 2.0, -is(d[c] > 0.0), 0.0),
+                ((-d[c]).max(0.0) - b[c] / 2.0, is(d[c] < 0.0), 0.0),
+                (d[c] * d[c] - v[c], -2.0 * d[c], 2.0),
+                relative_square(d[c], r[c], v[c], epsilon),
+            ]
+        });
+        for (k, pooled) in self.pooled.iter_mut().enumerate() {
+            pooled.add(terms.map(|of_channel| of_channel[k]), noise);
+        }
+        for c in (0..3).filter(|&c| v[c] != 0.0) {
+            let w = r[c] * r[c] + epsilon;
+            self.doubtful += if around.is_none_or(|a| is_continued(a[3 + c], a[6 + c], epsilon)) {
+                RELATIVE_UNCERTAINTY * (d[c] * d[c] / w - terms[c][5].0).abs()
+            } else {
+                (d[c] * d[c]).max(v[c]) / w
+            };
         }
         self.pixels += 1;
         self.fold += b.iter().sum::<f64>();
         self.noise += v.iter().sum::<f64>();
     }
 
-    fn finish(
-        &self,
-        noise_known: bool,
-        epsilon: f64,
-        (peak, peak_error): (f64, f64),
-        flip: flip::Flip,
-    ) -> ErrorEstimate {
+    fn finish(&self, noise_known: bool, scale: &Scale, flip: flip::Flip) -> ErrorEstimate {
         if self.pixels == 0 {
-            let (figures, standard_error) = Default::default();
-            return ErrorEstimate { pixels: 0, figures, standard_error, noise_rms: None, verdict: None };
+            return ErrorEstimate::default();
         }
+        let Scale { epsilon, peak, peak_error } = *scale;
         let samples = 3.0 * self.pixels as f64;
-        let square = self.square.mean(samples).max(0.0);
-        let square_error = self.square.variance(samples).sqrt();
+        let [bias, mae, over, under, square, relmse] = &self.pooled;
+        let square_error = square.variance(samples).sqrt();
+        let square = square.mean(samples).max(0.0);
         let rmse = square.sqrt();
         let relative = |value: f64| (epsilon > 0.0).then_some(value);
         let psnr = |value: f64| (square > 0.0 && peak > 0.0).then_some(value);
         let figures = Figures {
-            mae: Some(self.absolute.mean(samples).max(0.0)),
+            mae: Some(mae.mean(samples).max(0.0)),
             rmse: Some(rmse),
-            relmse: relative(self.relative.mean(samples).max(0.0)),
-            bias: Some(self.bias.mean(samples)),
-            over: Some(self.over.mean(samples).max(0.0)),
-            under: Some(self.under.mean(samples).max(0.0)),
+            relmse: relative(relmse.mean(samples).max(0.0)),
+            bias: Some(bias.mean(samples)),
+            over: Some(over.mean(samples).max(0.0)),
+            under: Some(under.mean(samples).max(0.0)),
             psnr_db: psnr(10.0 * (peak * peak / square).log10()),
             flip: flip.mean,
         };
@@ -287,12 +269,12 @@ impl Sums {
         let folded = FOLD_UNCERTAINTY * self.fold / samples;
         let error = |pooled: &Pooled, systematic: f64| known(pooled.variance(samples).sqrt().hypot(systematic));
         let standard_error = Figures {
-            mae: error(&self.absolute, folded),
+            mae: error(mae, folded),
             rmse: known(root_error(rmse, square_error)),
-            relmse: relative(0.0).and(error(&self.relative, self.doubtful / samples)),
-            bias: error(&self.bias, 0.0),
-            over: error(&self.over, folded / 2.0),
-            under: error(&self.under, folded / 2.0),
+            relmse: relative(0.0).and(error(relmse, self.doubtful / samples)),
+            bias: error(bias, 0.0),
+            over: error(over, folded / 2.0),
+            under: error(under, folded / 2.0),
             psnr_db: psnr(0.0)
                 .and(known(10.0 / std::f64::consts::LN_10 * (square_error / square).hypot(2.0 * peak_error / peak))),
             flip: flip.standard_error,

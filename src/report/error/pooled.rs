@@ -19,26 +19,19 @@ pub struct Pooled {
     floor: f64,
 }
 
-/// Value of a figure and its first two derivatives with respect to the reference, per channel of a pixel.
-#[derive(Debug, Clone, Copy)]
-pub struct Terms {
-    pub value: [f64; 3],
-    pub first: [f64; 3],
-    pub second: [f64; 3],
-}
-
 impl Pooled {
-    /// Adds a pixel. `noise` is the noise of the reference and the index of the pixel.
+    /// Adds a pixel. `terms` are the figure's value and its first two derivatives with respect to the reference, per
+    /// channel. `noise` is the noise of the reference and the index of the pixel.
     #[inline]
-    pub fn add(&mut self, terms: &Terms, noise: Option<(&ReferenceNoise, usize)>) {
-        self.sum += terms.value.iter().sum::<f64>();
+    pub fn add(&mut self, terms: [(f64, f64, f64); 3], noise: Option<(&ReferenceNoise, usize)>) {
+        self.sum += terms.iter().map(|term| term.0).sum::<f64>();
         let Some((noise, pixel)) = noise else { return };
         let square = square_share(noise.blocks);
         for a in 0..3 {
             for b in 0..3 {
                 let covariance = noise.between(pixel, a, b);
-                let second = terms.second[a] * terms.second[b] * covariance * covariance;
-                self.variance += terms.first[a] * terms.first[b] * covariance - (1.0 - square) * second;
+                let second = terms[a].2 * terms[b].2 * covariance * covariance;
+                self.variance += terms[a].1 * terms[b].1 * covariance - (1.0 - square) * second;
                 self.floor += square * second;
             }
         }

@@ -10,10 +10,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::codes::{code_of_difference, code_of_display, code_of_radiance, difference_scale};
-use super::data::PageImage;
+use super::data::PairPixels;
 use super::pack::{cost, pack};
 use super::shrink::{PixelExtent, mean_of_blocks, peak_of_blocks};
-use crate::math::color::luminance;
+use crate::image::Picture;
 
 /// Most pixels that a browser is asked to hold of one picture: 2560 × 1440 fits.
 pub const MOST_PIXELS: usize = 1 << 22;
@@ -39,18 +39,19 @@ impl Embedded {
     ///
     /// # Errors
     /// Those of [`pack`].
-    pub fn new(image: &PageImage<'_>, difference: &[f32], range: f32, factor: u32) -> io::Result<Embedded> {
-        let whole = image.size();
+    pub fn new(pair: &PairPixels<'_>, range: f32, factor: u32) -> io::Result<Embedded> {
+        let whole = pair.size();
         let size = whole.shrunk(factor);
         let scale = difference_scale(f64::from(range));
-        let planes = |pixels: &[Vec3]| planes_of(&mean_of_blocks(pixels, whole, factor), image.is_display_referred);
-        let [base, candidate] = [planes(&image.base), planes(&image.candidate)];
+        let code = if pair.exposure_ev.is_some() { code_of_radiance } else { code_of_display };
+        let planes = |picture: &Picture| planes_of(&mean_of_blocks(&picture.pixels, whole, factor), code);
+        let [base, candidate] = [planes(pair.base), planes(pair.candidate)];
         let difference = || {
-            let values = peak_of_blocks(difference, whole, factor);
+            let values = peak_of_blocks(pair.difference, whole, factor);
             vec![values.into_par_iter().map(|value| code_of_difference(f64::from(value), scale)).collect()]
         };
         let width = size.width as usize;
-        let relative = relative(&candidate, &base);
+        let relative: Vec<Vec<i16>> = candidate.iter().zip(&base).map(|(plane, from)| minus(plane, from)).collect();
         let (of_relative, of_absolute) = rayon::join(|| cost(&relative, width), || cost(&candidate, width));
         let is_candidate_relative = of_relative < of_absolute;
         let candidate = if is_candidate_relative { relative } else { candidate };
@@ -68,47 +69,29 @@ impl Embedded {
     }
 }
 
-/// The signed difference that heat map and histogram show: luminance of candidate − base; not a number where none is compared.
-pub fn differences(image: &PageImage<'_>) -> Vec<f32> {
-    let difference = |(i, (base, candidate)): (usize, (&Vec3, &Vec3))| match image.is_compared {
-        Some(is_compared) if !is_compared[i] => f32::NAN,
-        _ => luminance(*candidate - *base),
-    };
-    image.base.par_iter().zip(&image.candidate[..]).enumerate().map(difference).collect()
-}
-
 /// The codes of a picture in three planes.
-fn planes_of(pixels: &[Vec3], is_display_referred: bool) -> Vec<Vec<i16>> {
-    let code = if is_display_referred { code_of_display } else { code_of_radiance };
+fn planes_of(pixels: &[Vec3], code: fn(f32) -> i16) -> Vec<Vec<i16>> {
     let channel = |c: usize| -> Vec<i16> { pixels.par_iter().map(|pixel| code(pixel[c])).collect() };
     let [red, green, blue] = [0, 1, 2].map(channel);
-    let minus_green =
-        |plane: Vec<i16>| -> Vec<i16> { plane.iter().zip(&green).map(|(c, g)| c.wrapping_sub(*g)).collect() };
-    let (red, blue) = (minus_green(red), minus_green(blue));
+    let (red, blue) = (minus(&red, &green), minus(&blue, &green));
     vec![green, red, blue]
 }
 
-/// Planes as differences from other ones.
-fn relative(planes: &[Vec<i16>], from: &[Vec<i16>]) -> Vec<Vec<i16>> {
-    let minus =
-        |(plane, from): (&Vec<i16>, &Vec<i16>)| plane.iter().zip(from).map(|(a, b)| a.wrapping_sub(*b)).collect();
-    planes.iter().zip(from).map(minus).collect()
+/// A plane as differences from another one.
+fn minus(plane: &[i16], from: &[i16]) -> Vec<i16> {
+    plane.iter().zip(from).map(|(a, b)| a.wrapping_sub(*b)).collect()
 }
 
 /// The smallest power of two that leaves few enough pixels for a browser.
 pub fn finest_factor(size: PixelExtent) -> u32 {
-    let mut factor = 1;
-    while size.shrunk(factor).pixels() > MOST_PIXELS {
-        factor *= 2;
-    }
-    factor
+    let mut factors = (0..31).map(|power| 1 << power);
+    factors.find(|factor| size.shrunk(*factor).pixels() <= MOST_PIXELS).unwrap_or(1 << 31)
 }
 
 #[cfg(test)]
 pub(super) mod tests {
-    use std::borrow::Cow;
-
     use super::*;
+    use crate::math::color::luminance;
     use crate::report::page::codes::{difference_of_code, radiance_of_code};
     use crate::report::page::pack::unpack;
 
@@ -138,43 +121,38 @@ pub(super) mod tests {
         ([pixels(&base), pixels(&candidate)], difference)
     }
 
-    /// A pair with many magnitudes, zeros, negatives and what is no light.
-    pub fn pair(width: u32, height: u32) -> PageImage<'static> {
-        let side = |turn: f32| -> Vec<Vec3> {
+    /// Base and candidate with many magnitudes, zeros, negatives and what is no light.
+    pub fn pictures(width: u32, height: u32) -> [Picture; 2] {
+        let side = |turn: f32| {
             let pixel = |i: u32| {
                 let (x, y) = ((i % width) as f32, (i / width) as f32);
                 let magnitude = ((0.31 * x + turn).sin() * 9.0 - 0.2 * y).exp2();
                 Vec3::new(magnitude, 0.7 * magnitude + 0.01, if i.is_multiple_of(11) { 0.0 } else { 0.2 * magnitude })
             };
-            (0..width * height).map(pixel).collect()
+            Picture::from_pixels(width, height, (0..width * height).map(pixel).collect())
         };
         let (base, mut candidate) = (side(0.0), side(0.05));
-        candidate[5] = Vec3::new(f32::NAN, f32::INFINITY, -3.0);
-        PageImage {
-            name: "lit/visibility_on".to_owned(),
-            quantity: "radiance".to_owned(),
-            unit: "W·m⁻²·sr⁻¹".to_owned(),
-            width,
-            height,
-            base: Cow::Owned(base),
-            candidate: Cow::Owned(candidate),
-            exposure_ev: 0.5,
-            is_display_referred: false,
-            is_judged: true,
-            is_compared: None,
-            figures: Vec::new(),
-            worst_pixel: Some([3, 4]),
-        }
+        candidate.pixels[5] = Vec3::new(f32::NAN, f32::INFINITY, -3.0);
+        [base, candidate]
+    }
+
+    pub fn differences([base, candidate]: &[Picture; 2]) -> Vec<f32> {
+        base.pixels.iter().zip(&candidate.pixels).map(|(b, c)| luminance(*c - *b)).collect()
+    }
+
+    pub fn pair<'a>([base, candidate]: &'a [Picture; 2], difference: &'a [f32]) -> PairPixels<'a> {
+        let (name, unit, exposure_ev) = ("lit/visibility_on", "W·m⁻²·sr⁻¹", Some(0.5));
+        PairPixels { name, unit, base, candidate, difference, exposure_ev, is_judged: true }
     }
 
     #[test]
     fn every_channel_comes_back_within_a_percent() {
-        let image = pair(37, 23);
-        let difference = differences(&image);
-        let embedded = Embedded::new(&image, &difference, 2.0, 1).unwrap();
+        let pictures = pictures(37, 23);
+        let difference = differences(&pictures);
+        let embedded = Embedded::new(&pair(&pictures, &difference), 2.0, 1).unwrap();
         let ([base, candidate], shown) = decode(&embedded);
-        for (pixels, codes) in [(&image.base, base), (&image.candidate, candidate)] {
-            for (pixel, codes) in pixels.iter().zip(codes) {
+        for (picture, codes) in pictures.iter().zip([base, candidate]) {
+            for (pixel, codes) in picture.pixels.iter().zip(codes) {
                 for c in 0..3 {
                     let (value, back) = (f64::from(pixel[c]), radiance_of_code(codes[c]));
                     let same = value == back || (value.is_nan() && back.is_nan());
@@ -193,20 +171,20 @@ pub(super) mod tests {
 
     #[test]
     fn what_is_equal_costs_next_to_nothing() {
-        let mut image = pair(64, 64);
-        image.candidate = image.base.clone();
-        let embedded = Embedded::new(&image, &differences(&image), 1.0, 1).unwrap();
+        let [base, _] = pictures(64, 64);
+        let pictures = [base.clone(), base];
+        let embedded = Embedded::new(&pair(&pictures, &differences(&pictures)), 1.0, 1).unwrap();
         assert!(embedded.is_candidate_relative);
         assert!(embedded.candidate.len() + embedded.difference.len() < embedded.base.len() / 20);
     }
 
     #[test]
     fn display_values_come_back_exactly() {
-        let mut image = pair(8, 8);
-        image.is_display_referred = true;
-        image.base = (0..64).map(|i| Vec3::splat(i as f32 * 4.0 / 255.0)).collect();
-        image.candidate = image.base.clone();
-        let ([base, _], _) = decode(&Embedded::new(&image, &differences(&image), 1.0, 1).unwrap());
+        let base = Picture::from_pixels(8, 8, (0..64).map(|i| Vec3::splat(i as f32 * 4.0 / 255.0)).collect());
+        let pictures = [base.clone(), base];
+        let difference = differences(&pictures);
+        let shown = PairPixels { exposure_ev: None, ..pair(&pictures, &difference) };
+        let ([base, _], _) = decode(&Embedded::new(&shown, 1.0, 1).unwrap());
         assert!(base.iter().enumerate().all(|(i, code)| *code == [i as i16 * 4; 3]));
     }
 
@@ -214,8 +192,8 @@ pub(super) mod tests {
     fn too_large_a_picture_is_shrunk() {
         assert_eq!(finest_factor(PixelExtent { width: 1920, height: 1080 }), 1);
         assert_eq!(finest_factor(PixelExtent { width: 7680, height: 4320 }), 4);
-        let image = pair(9, 7);
-        let embedded = Embedded::new(&image, &differences(&image), 1.0, 2).unwrap();
+        let pictures = pictures(9, 7);
+        let embedded = Embedded::new(&pair(&pictures, &differences(&pictures)), 1.0, 2).unwrap();
         assert_eq!((embedded.factor, embedded.size), (2, PixelExtent { width: 5, height: 4 }));
         assert_eq!(decode(&embedded).1.len(), 20);
     }

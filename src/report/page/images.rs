@@ -1,13 +1,13 @@
 //! The pairs of pictures, packed for the page.
 
-use glam::Vec3;
 use minijinja::value::Serde;
 use minijinja::{Value, context};
 
-use super::data::{PageError, PageImage};
-use super::embed::{Embedded, differences, finest_factor};
+use super::data::{PageError, PairPixels};
+use super::embed::{Embedded, finest_factor};
+use super::histogram::histogram;
 use super::visible::visible;
-use super::{budget, histogram, still};
+use super::{budget, still};
 use crate::report::heatmap::range_of;
 
 /// A pair of pictures, ready for the page: its pixels are needed no more, so that pages of many large pictures can be made one
@@ -24,46 +24,37 @@ pub struct PackedImage {
 }
 
 impl PackedImage {
-    /// Packs one of about `pairs` pairs.
+    /// Packs one of about `pairs` pairs. `view`: what the template reads of it besides.
     ///
     /// # Errors
-    /// Pictures whose pixels do not match their size.
-    pub fn new(image: &PageImage<'_>, pairs: usize) -> Result<PackedImage, PageError> {
-        let (base, candidate) = (image.base.len(), image.candidate.len());
-        let is_mask_right = image.is_compared.is_none_or(|is_compared| is_compared.len() == base);
-        if base != image.size().pixels() || candidate != base || base == 0 || !is_mask_right {
-            let (name, width, height) = (visible(&image.name), image.width, image.height);
-            return Err(PageError::Size { name, width, height, base, candidate });
+    /// Pictures of two sizes, or of none.
+    pub fn new(pair: &PairPixels<'_>, view: Value, pairs: usize) -> Result<PackedImage, PageError> {
+        let (size, [base, candidate]) = (pair.size(), [pair.base, pair.candidate].map(|picture| picture.pixels.len()));
+        if base == 0 || candidate != base || pair.difference.len() != base {
+            return Err(PageError::Size { name: visible(pair.name), base, candidate });
         }
-        let difference = differences(image);
-        let range = range_of(&difference);
+        let range = range_of(pair.difference);
         let width = still::width_for(pairs);
         let stills = [
-            still::side(image, &image.base, width)?,
-            still::side(image, &image.candidate, width)?,
-            still::heatmap(&difference, image.size(), range, width)?,
+            still::side(pair.base, pair.exposure_ev, width)?,
+            still::side(pair.candidate, pair.exposure_ev, width)?,
+            still::heatmap(pair.difference, size, range, width)?,
         ];
-        let legend = still::legend(&difference, range, &visible(&image.unit))?;
+        let legend = still::legend(pair.difference, range, &visible(pair.unit))?;
         let stills_bytes = stills.iter().map(String::len).sum::<usize>() + 2 * legend.len();
-        let non_finite = [&image.base, &image.candidate].map(|pixels| pixels.iter().filter(is_not_finite).count());
-        let histogram =
-            histogram::count("Differences of luminance", &difference, f64::from(range), &image.unit, "pixels");
         let view = context! {
+            name => pair.name,
+            unit => pair.unit,
             range => f64::from(range),
-            non_finite => Serde(non_finite),
             stills => Serde(stills),
             legend,
-            histogram => Serde(histogram),
-            ..Value::from(Serde(image))
+            histogram => histogram("Differences of luminance", pair.difference, range, pair.unit, "pixels"),
+            ..view
         };
-        let embed = |factor| Embedded::new(image, &difference, range, factor);
-        let levels = budget::factors(finest_factor(image.size())).map(embed).collect::<Result<_, _>>()?;
-        Ok(PackedImage { is_judged: image.is_judged, view, stills_bytes, levels })
+        let embed = |factor| Embedded::new(pair, range, factor);
+        let levels = budget::factors(finest_factor(size)).map(embed).collect::<Result<_, _>>()?;
+        Ok(PackedImage { is_judged: pair.is_judged, view, stills_bytes, levels })
     }
-}
-
-fn is_not_finite(pixel: &&Vec3) -> bool {
-    !pixel.is_finite()
 }
 
 /// All pairs, those that decide first, in the room that a page has.

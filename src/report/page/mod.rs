@@ -15,15 +15,15 @@ mod still;
 mod view;
 mod visible;
 
-use minijinja::context;
+use minijinja::{Value, context};
 
 pub use codes::{code_of_radiance, radiance_of_code};
-pub use data::{
-    Command, ConfigChange, Figure, FigureTable, Histogram, PageError, PageImage, Plot, ProbeComparison, ProbeRow, Side,
-};
+pub use data::{Command, ConfigChange, PageError, PairPixels};
 pub use embed::MOST_PIXELS;
+pub use histogram::histogram;
 pub use images::PackedImage;
-pub use view::Page;
+
+use crate::report::gate::Gate;
 
 const STYLE: &str = include_str!("../assets/page/page.css");
 const START: &str = include_str!("../assets/page/start.js");
@@ -36,14 +36,15 @@ const SCRIPTS: [&str; 3] = [
 /// What stands for the nonce until it is known. Never in a page that is handed out.
 const NO_NONCE: &str = "0";
 
-/// The page as HTML.
+/// The page as HTML. `report`: of the comparison, as its JSON has it, with `plots` (each a
+/// `title` and an `svg`, shown as a picture: whatever it holds, it cannot run or load anything), and with `figures` and `histograms` of its probes.
 ///
 /// # Errors
 /// None in practice: the templates are part of the program.
-pub fn render(page: Page<'_>) -> Result<String, PageError> {
+pub fn render(report: Value, gates: &[Gate], images: Vec<PackedImage>) -> Result<String, PageError> {
     let environment = view::environment()?;
     let template = environment.get_template("page.html")?;
-    let view = view::view(page);
+    let view = view::view(report, gates, images);
     let with_nonce = |nonce: &str| {
         template.render(
             context! { page => view.clone(), style => STYLE, start => START, scripts => SCRIPTS, nonce => nonce },
@@ -56,19 +57,17 @@ pub fn render(page: Page<'_>) -> Result<String, PageError> {
 
 #[cfg(test)]
 mod tests {
+    use minijinja::value::Serde;
+    use serde_json::json;
+
     use super::*;
-    use crate::report::gate::Gate;
-    use crate::report::page::embed::tests::pair;
+    use crate::report::page::embed::tests::{differences, pair, pictures};
 
     /// A page whose every text is `text`.
     fn page_of(text: &str) -> String {
-        let text = text.to_owned();
-        let figure = Figure { name: text.clone(), unit: text.clone(), value: Some(1.0), ..Figure::default() };
-        let side = Side { path: text.clone(), kind: text.clone(), seed: Some(7), scene_blake3: Some(text.clone()) };
-        let other = side.clone();
         let gates = [Gate {
-            name: text.clone(),
-            item: text.clone(),
+            name: text.to_owned(),
+            item: text.to_owned(),
             base: None,
             candidate: Some(1.0),
             value: Some(2.0),
@@ -78,45 +77,33 @@ mod tests {
             standard_error: Some(0.1),
             passed: false,
             waived: false,
-            source: text.clone(),
-            explanation: text.clone(),
+            source: text.to_owned(),
+            explanation: text.to_owned(),
         }];
-        let mut image = pair(24, 16);
-        image.name = text.clone();
-        image.quantity = text.clone();
-        image.unit = text.clone();
-        image.figures = vec![figure.clone()];
-        let row = ProbeRow {
-            index: 3,
-            position_m: [1.0, f64::NAN, -2.0],
-            irradiance: Some(0.1),
-            distance_m: None,
-            base_state: text.clone(),
-            candidate_state: text.clone(),
-            moved_m: Some(0.0),
+        let pictures = pictures(24, 16);
+        let difference = differences(&pictures);
+        let pair = PairPixels { name: text, unit: text, ..pair(&pictures, &difference) };
+        let figure = json!({"item": text, "name": text, "unit": text, "difference": 1.0});
+        let image = json!({"width": 24, "height": 16, "exposure_ev": 0.5, "quantity": text, "figures": [figure]});
+        let side = json!({"path": text, "kind": text, "seed": 7, "scene_blake3": text, "config": text});
+        let row = json!({"index": 3, "position_m": [1.0, null, -2.0], "irradiance_difference_relative": 0.1,
+                         "state_base": text, "state_candidate": format!("{text}!"), "moved_m": 0.0});
+        let report = json!({
+            "base": side, "candidate": side,
+            "verdict": {"passed": false, "gates": 1, "failed": 1, "waived": 0},
+            "figures": [figure],
+            "plots": [{"title": text, "svg": format!("<svg>{text}</svg>")}],
+            "added": [text], "missing": [text],
+            "commands": [{"purpose": text, "line": text}],
+            "config_changes": [{"key": text, "base": text, "candidate": null}],
+            "notes": [text],
+        });
+        let probes = context! {
+            histograms => [histogram(text, &[0.1, -0.2], 1.0, text, text)],
+            ..Value::from(Serde(json!({"item": text, "figures": [figure], "worst": [row]})))
         };
-        let histogram =
-            Histogram { title: text.clone(), unit: text.clone(), what: text.clone(), values: vec![0.1, -0.2] };
-        let page = Page {
-            title: text.clone(),
-            sides: [side, other],
-            gates: &gates,
-            images: vec![PackedImage::new(&image, 1).unwrap()],
-            probes: vec![ProbeComparison {
-                name: text.clone(),
-                figures: vec![figure.clone()],
-                worst: vec![row],
-                histograms: vec![histogram],
-            }],
-            figures: vec![FigureTable { title: text.clone(), figures: vec![figure] }],
-            plots: vec![Plot { title: text.clone(), svg: format!("<svg>{text}</svg>") }],
-            added: vec![text.clone()],
-            missing: vec![text.clone()],
-            commands: &[Command { purpose: text.clone(), line: text.clone() }],
-            config_changes: Some(&vec![ConfigChange { key: text.clone(), base: Some(text.clone()), candidate: None }]),
-            notes: vec![text],
-        };
-        render(page).unwrap()
+        let packed = PackedImage::new(&pair, Value::from(Serde(image)), 1).unwrap();
+        render(context! { probes => [probes], ..Value::from(Serde(report)) }, &gates, vec![packed]).unwrap()
     }
 
     #[test]
@@ -170,8 +157,10 @@ mod tests {
 
     #[test]
     fn pixels_must_match_their_size() {
-        let mut image = pair(24, 16);
-        image.width = 25;
-        assert!(matches!(PackedImage::new(&image, 1), Err(PageError::Size { width: 25, .. })));
+        let [base, _] = pictures(24, 16);
+        let [_, candidate] = pictures(25, 16);
+        let pictures = [base, candidate];
+        let packed = PackedImage::new(&pair(&pictures, &differences(&pictures)), Value::UNDEFINED, 1);
+        assert!(matches!(packed, Err(PageError::Size { base: 384, candidate: 400, .. })));
     }
 }

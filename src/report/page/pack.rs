@@ -52,14 +52,8 @@ fn predict(plane: &[i16], width: usize, i: usize) -> i16 {
     let left = if first_column { 0 } else { plane[i - 1] };
     let upper = if first_row { 0 } else { plane[i - width] };
     let corner = if first_column || first_row { 0 } else { plane[i - width - 1] };
-    let (low, high) = (left.min(upper), left.max(upper));
-    if corner >= high {
-        low
-    } else if corner <= low {
-        high
-    } else {
-        left.wrapping_add(upper).wrapping_sub(corner)
-    }
+    let sum = i32::from(left) + i32::from(upper) - i32::from(corner);
+    sum.clamp(i32::from(left.min(upper)), i32::from(left.max(upper))) as i16
 }
 
 /// The inverse of [`pack`]: `count` planes of `width · height` codes. `None` for any other text.

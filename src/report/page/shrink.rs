@@ -43,17 +43,13 @@ pub fn peak_of_blocks(values: &[f32], size: PixelExtent, factor: u32) -> Vec<f32
 
 fn per_block<T>(size: PixelExtent, factor: u32, of: impl Fn(&mut dyn Iterator<Item = usize>) -> T) -> Vec<T> {
     let shrunk = size.shrunk(factor);
-    let mut out = Vec::with_capacity(shrunk.pixels());
-    for row in 0..shrunk.height {
-        for column in 0..shrunk.width {
-            let rows = row * factor..((row + 1) * factor).min(size.height);
-            let columns = column * factor..((column + 1) * factor).min(size.width);
-            let mut indices =
-                rows.flat_map(|y| columns.clone().map(move |x| y as usize * size.width as usize + x as usize));
-            out.push(of(&mut indices));
-        }
-    }
-    out
+    let block = |i: usize| {
+        let (row, column) = (i as u32 / shrunk.width * factor, i as u32 % shrunk.width * factor);
+        let rows = row..(row + factor).min(size.height);
+        let columns = column..(column + factor).min(size.width);
+        of(&mut rows.flat_map(|y| columns.clone().map(move |x| y as usize * size.width as usize + x as usize)))
+    };
+    (0..shrunk.pixels()).map(block).collect()
 }
 
 #[cfg(test)]

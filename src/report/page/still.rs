@@ -6,9 +6,8 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use glam::Vec3;
 
-use super::data::PageImage;
 use super::shrink::{PixelExtent, mean_of_blocks, peak_of_blocks};
-use crate::image::{Picture8, tonemap};
+use crate::image::{Picture, Picture8, tonemap};
 use crate::math::color::byte_from_unit;
 use crate::report::colormap::color;
 use crate::report::legend::Legend;
@@ -33,22 +32,18 @@ pub fn width_for(pairs: usize) -> u32 {
     WIDTHS.iter().find(|(most, _)| pairs <= *most).map_or(LEAST_WIDTH, |(_, width)| *width)
 }
 
-/// One side, at the pair's exposure, at most `width` wide, as a data URI.
+/// One side, at an exposure or as it is, at most `width` wide, as a data URI.
 ///
 /// # Errors
 /// None in practice: the writer is memory.
-pub fn side(image: &PageImage<'_>, pixels: &[Vec3], width: u32) -> io::Result<String> {
-    let factor = image.width.div_ceil(width).max(1);
+pub fn side(picture: &Picture, exposure_ev: Option<f32>, width: u32) -> io::Result<String> {
+    let factor = picture.width.div_ceil(width).max(1);
     let color = |pixel: Vec3| {
-        if !pixel.is_finite() {
-            MARK
-        } else if image.is_display_referred {
-            pixel.to_array().map(byte_from_unit)
-        } else {
-            tonemap(pixel, image.exposure_ev).to_array().map(byte_from_unit)
-        }
+        let shown = exposure_ev.map_or(pixel, |ev| tonemap(pixel, ev));
+        if pixel.is_finite() { shown.to_array().map(byte_from_unit) } else { MARK }
     };
-    data_uri(image.size().shrunk(factor), mean_of_blocks(pixels, image.size(), factor).into_iter().map(color).collect())
+    let size = PixelExtent { width: picture.width, height: picture.height };
+    data_uri(size.shrunk(factor), mean_of_blocks(&picture.pixels, size, factor).into_iter().map(color).collect())
 }
 
 /// The differences in the colours of a heat map that ends at ±`range`, as a data URI.

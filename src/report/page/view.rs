@@ -1,13 +1,11 @@
-//! What the template gets: the page's data as they are, and filters that write figures.
+//! What the template gets: the report as it is, what its gates and pictures come to, and filters that write figures.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use minijinja::value::Serde;
 use minijinja::{Environment, Error, Value, context, escape_formatter};
-use serde::Serialize;
 
 use super::codes;
-use super::data::{Command, ConfigChange, FigureTable, Plot, ProbeComparison, Side};
 use super::images::{PackedImage, images};
 use super::visible::visible;
 use crate::report::colormap::color_at;
@@ -23,41 +21,6 @@ const DIGITS: usize = 4;
 
 /// Larger whole numbers are not counts but bytes and the like.
 const MOST_COUNTED: f64 = 1.0e9;
-
-/// What the page shows.
-#[derive(Debug, Serialize)]
-pub struct Page<'a> {
-    pub title: String,
-    /// Base, candidate.
-    pub sides: [Side; 2],
-    /// The worst first.
-    #[serde(skip)]
-    pub gates: &'a [Gate],
-    /// Where the page would become too large, those that are not judged lose pixels first, and of these the last ones.
-    #[serde(skip)]
-    pub images: Vec<PackedImage>,
-    /// One for each pair of probe files.
-    pub probes: Vec<ProbeComparison>,
-    pub figures: Vec<FigureTable>,
-    pub plots: Vec<Plot>,
-    /// Items that only the candidate has.
-    pub added: Vec<String>,
-    /// Items that only the base has.
-    pub missing: Vec<String>,
-    pub commands: &'a [Command],
-    /// `None` where a side does not tell its configuration.
-    pub config_changes: Option<&'a Vec<ConfigChange>>,
-    pub notes: Vec<String>,
-}
-
-/// A gate and what is made of it.
-#[derive(Serialize)]
-struct GateView<'a> {
-    #[serde(flatten)]
-    gate: &'a Gate,
-    state: String,
-    margin_text: String,
-}
 
 /// The templates, and the filters that they use.
 ///
@@ -82,23 +45,22 @@ pub fn environment() -> Result<Environment<'static>, Error> {
     Ok(environment)
 }
 
-/// All that the page shows.
-pub fn view(mut page: Page<'_>) -> Value {
-    let images = images(std::mem::take(&mut page.images));
-    let gates = page.gates.iter().map(|gate| GateView {
-        gate,
-        state: words::outcome(gate).to_lowercase(),
-        margin_text: words::margin(gate),
-    });
-    let gates: Vec<Value> = gates.map(|gate| Value::from(Serde(gate))).collect();
+/// All that the page shows: the report of a comparison and what its gates and pictures come to.
+pub fn view(report: Value, gates: &[Gate], packed: Vec<PackedImage>) -> Value {
+    let gate = |gate: &Gate| {
+        let is_defined = gate.value.is_some();
+        context! {
+            state => words::outcome(gate).to_lowercase(),
+            text => if is_defined { figure(gate.value, Some(gate.unit), gate.standard_error) } else { words::value(gate) },
+            margin_text => words::margin(gate),
+            ..Value::from(Serde(gate))
+        }
+    };
     // From the low to the high end, RGB bytes.
     let colors: Vec<u8> = (0..COLORS).flat_map(|i| color_at(i as f64 / (COLORS - 1) as f64)).collect();
     context! {
-        version => env!("CARGO_PKG_VERSION"),
-        passed => !page.gates.iter().any(Gate::fails),
-        judged => page.gates.iter().filter(|gate| gate.is_judged()).count(),
-        gates,
-        images,
+        gates => gates.iter().map(gate).collect::<Vec<_>>(),
+        images => images(packed),
         colors => STANDARD.encode(colors),
         codes => context! {
             per_octave => codes::PER_OCTAVE,
@@ -107,7 +69,7 @@ pub fn view(mut page: Page<'_>) -> Value {
             infinite => codes::INFINITE,
             nan => codes::NAN,
         },
-        ..Value::from(Serde(page))
+        ..report
     }
 }
 

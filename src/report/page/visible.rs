@@ -3,15 +3,8 @@
 /// `text` with control characters and those of Unicode's bidirectional algorithm (UAX #9, section 2) as ⟨U+202E⟩, so that a name
 /// cannot pose as another. Line breaks count as control characters. Markup is the template engine's to escape.
 pub fn visible(text: &str) -> String {
-    let mut shown = String::with_capacity(text.len());
-    for character in text.chars() {
-        if is_hidden(character) {
-            shown.push_str(&format!("⟨U+{:04X}⟩", character as u32));
-        } else {
-            shown.push(character);
-        }
-    }
-    shown
+    let spelled = |c: char| if is_hidden(c) { format!("⟨U+{:04X}⟩", c as u32) } else { c.to_string() };
+    text.chars().map(spelled).collect()
 }
 
 fn is_hidden(character: char) -> bool {

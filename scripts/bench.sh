@@ -123,11 +123,11 @@ for file in sorted(folder.glob("**/new/benchmark.json")):
     path = file.parent.parent
     # `change` holds new ÷ old − 1.
     found[name] = median(path, "new"), median(path, "change")
-default = found.get("query/single/default", (None, None))[0]
+default = found.get("query/default", (None, None))[0]
 for name, (ns, change) in found.items():
     is_query = name.startswith("query/")
     per = ns / POINTS if is_query else ns
-    against = f"{ns / default:6.2f} × the default's single look-up" if is_query and default else ""
+    against = f"{ns / default:6.2f} × the default's" if is_query and default else ""
     before = f"{1 + change:6.3f} × the run before" if change is not None else ""
     print(f"{name:<48} {per:12.1f} ns  {against:<42} {before}".rstrip())
 PY

@@ -6,14 +6,14 @@
 use std::hint::black_box;
 use std::path::Path;
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{Vec3, Vec3A};
 use lightprobe::bake::{Baked, Circumstances, prepare};
 use lightprobe::config::Config;
 use lightprobe::light::World;
 use lightprobe::probe::capture::{Capture, ProbeCapture};
 use lightprobe::probe::file::SceneRecord;
-use lightprobe::probe::query::{BatchVisibility, Query, QueryPoint, Visibility};
+use lightprobe::probe::query::{Query, QueryPoint, Visibility};
 use lightprobe::probe::store::surface::Facing;
 use lightprobe::probe::transport::operator::Operator;
 use lightprobe::scene::{self, LoadOptions, Scene, TriangleIndex};
@@ -83,12 +83,8 @@ fn query(criterion: &mut Criterion) {
         let config = config(keys);
         let volume = bake(&world, &config).volume;
         let query = Query { volume: &volume, settings: &config.query };
-        group.bench_function(BenchmarkId::new("single", name), |bencher| {
+        group.bench_function(name, |bencher| {
             bencher.iter(|| points.iter().map(|p| query.irradiance(black_box(p), Visibility::Stored)).sum::<Vec3>());
-        });
-        let mut out = vec![Vec3::ZERO; POINTS];
-        group.bench_function(BenchmarkId::new("batch", name), |bencher| {
-            bencher.iter(|| query.batch(black_box(&points), BatchVisibility::Stored, &mut out));
         });
     }
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::points::ImagePoint;
 use crate::light::World;
-use crate::probe::query::{BatchVisibility, Query, Visibility};
+use crate::probe::query::{Query, Visibility};
 use crate::trace::Ray;
 
 /// Number of times that shading is repeated to measure its time.
@@ -49,15 +49,6 @@ impl VisibilityMode {
             VisibilityMode::Ray => Visibility::Exact(mask),
         }
     }
-
-    /// The same for many points with a mask each.
-    pub fn of_batch(self, masks: &[u8]) -> BatchVisibility<'_> {
-        match self {
-            VisibilityMode::Off => BatchVisibility::Off,
-            VisibilityMode::On => BatchVisibility::Stored,
-            VisibilityMode::Ray => BatchVisibility::Exact(masks),
-        }
-    }
 }
 
 /// For every point, which of its eight probes it sees: bit i is set if the probe of corner i is active and visible.
@@ -88,16 +79,8 @@ pub fn exact_masks(world: &World, query: &Query, points: &[ImagePoint]) -> Vec<u
 
 /// Irradiance from the probes at every point, W·m⁻².
 pub fn irradiance(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<Vec3> {
-    let mut out = vec![Vec3::ZERO; points.len()];
-    let chunks = out.par_chunks_mut(BATCH).zip(points.par_chunks(BATCH).zip(masks.par_chunks(BATCH)));
-    chunks.for_each(|(out, (points, masks))| {
-        query.for_each(points.iter().map(ImagePoint::query), mode.of_batch(masks), |i, irradiance| out[i] = irradiance);
-    });
-    out
+    points.par_iter().zip(masks).map(|(point, &mask)| query.irradiance(&point.query(), mode.visibility(mask))).collect()
 }
-
-/// Points that one task asks for at a time.
-const BATCH: usize = 512;
 
 /// Milliseconds for querying and shading all points, one entry per run.
 pub fn time_shading(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<f64> {
@@ -105,11 +88,9 @@ pub fn time_shading(query: &Query, points: &[ImagePoint], masks: &[u8], mode: Vi
     (0..RUNS)
         .map(|_| {
             let started = Instant::now();
-            let chunks = radiance.par_chunks_mut(BATCH).zip(points.par_chunks(BATCH).zip(masks.par_chunks(BATCH)));
-            chunks.for_each(|(out, (points, masks))| {
-                query.for_each(points.iter().map(ImagePoint::query), mode.of_batch(masks), |i, indirect| {
-                    out[i] = super::layers::beauty(&points[i], indirect);
-                });
+            radiance.par_iter_mut().zip(points.par_iter().zip(masks)).for_each(|(out, (point, &mask))| {
+                let indirect = query.irradiance(&point.query(), mode.visibility(mask));
+                *out = super::layers::beauty(point, indirect);
             });
             std::hint::black_box(&radiance);
             started.elapsed().as_secs_f64() * 1e3

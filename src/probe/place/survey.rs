@@ -254,11 +254,11 @@ impl Surveyor<'_, '_> {
                 corners[0] + (corners[1] - corners[0]) * barycentric.x + (corners[2] - corners[0]) * barycentric.y;
             let origin = position + normal * ray_offset(corners);
             let mut seen = 0u8;
-            for corner in 0..8 {
+            for (corner, probe) in probes.iter().enumerate() {
                 if active >> corner & 1 == 0 {
                     continue;
                 }
-                let probe = self.placement.positions[probes[corner].0 as usize];
+                let probe = self.placement.positions[probe.0 as usize];
                 // A probe behind the surface is hidden by the surface itself.
                 if (probe - origin).dot(normal) <= 0.0 {
                     continue;

@@ -1,5 +1,5 @@
-//! The tests that tell which of its eight probes a point sees. Each is a type of its own, so that loops over points are
-//! compiled for each.
+//! The tests that tell which of its eight probes a point sees. Each is a type of its own, so that the loop over
+//! corners is compiled for each.
 
 use glam::{Vec2, Vec3};
 

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3, Vec3A};
 
 use super::corner_test::{CornerTest, Mask, MomentsTest, SurfaceTest};
-use super::point::{BatchVisibility, CornerWeights, QueryPoint, Visibility};
+use super::point::{CornerWeights, QueryPoint, Visibility};
 use super::settings::{QuerySettings, VisibilityTest};
 use crate::math::octahedral::oct_from_direction;
 use crate::probe::Volume;
@@ -21,17 +21,6 @@ enum Test<'v> {
     Mask(Mask),
     Moments(MomentsTest<'v>),
     Surface(SurfaceTest<'v>),
-}
-
-/// Calls `$body` with `$test` bound to the query's test: the loop in it is compiled for each.
-macro_rules! with_test {
-    ($query:expr, $visibility:expr, |$test:ident| $body:expr) => {
-        match $query.test($visibility) {
-            Test::Mask($test) => $body,
-            Test::Moments($test) => $body,
-            Test::Surface($test) => $body,
-        }
-    };
 }
 
 impl<'v> Query<'v> {
@@ -74,7 +63,11 @@ impl<'v> Query<'v> {
 
     /// Weights of the eight probes around a point; inactive probes weigh nothing.
     pub fn weights(&self, point: &QueryPoint, visibility: Visibility) -> CornerWeights {
-        with_test!(self, visibility, |test| self.weigh(point, &test))
+        match self.test(visibility) {
+            Test::Mask(test) => self.weigh(point, &test),
+            Test::Moments(test) => self.weigh(point, &test),
+            Test::Surface(test) => self.weigh(point, &test),
+        }
     }
 
     /// Which corners of its cell the stored table says that a point sees, where it is all the test there is: it then needs to
@@ -120,50 +113,6 @@ impl<'v> Query<'v> {
     /// Irradiance around the point's normal, W·m⁻²; zero where no probe counts.
     pub fn irradiance(&self, point: &QueryPoint, visibility: Visibility) -> Vec3 {
         self.blend(&self.weights(point, visibility), oct_from_direction(point.normal))
-    }
-
-    /// Irradiance at many points: the settings are looked at once for all.
-    ///
-    /// # Panics
-    /// When `out`, or the masks, are not as many as the points.
-    pub fn batch(&self, points: &[QueryPoint], visibility: BatchVisibility, out: &mut [Vec3]) {
-        assert_eq!(points.len(), out.len(), "a result for every point");
-        self.for_each(points.iter().copied(), visibility, |i, irradiance| out[i] = irradiance);
-    }
-
-    /// [`Self::batch`] for points that are made as they are asked: calls `each` with the number of every point and its
-    /// irradiance.
-    ///
-    /// # Panics
-    /// When there are fewer masks than points.
-    #[inline]
-    pub fn for_each(
-        &self,
-        points: impl ExactSizeIterator<Item = QueryPoint>,
-        visibility: BatchVisibility,
-        mut each: impl FnMut(usize, Vec3),
-    ) {
-        let visibility = match visibility {
-            BatchVisibility::Exact(masks) => {
-                assert!(points.len() <= masks.len(), "a mask for every point");
-                for (i, (point, &mask)) in points.zip(masks).enumerate() {
-                    each(i, self.asked(&point, &Mask(mask)));
-                }
-                return;
-            }
-            BatchVisibility::Off => Visibility::Off,
-            BatchVisibility::Stored => Visibility::Stored,
-        };
-        with_test!(self, visibility, |test| {
-            for (i, point) in points.enumerate() {
-                each(i, self.asked(&point, &test));
-            }
-        });
-    }
-
-    #[inline]
-    fn asked(&self, point: &QueryPoint, test: &impl CornerTest) -> Vec3 {
-        self.blend(&self.weigh(point, test), oct_from_direction(point.normal))
     }
 
     /// Weighted mean of the probes' irradiance around the direction `oct`.

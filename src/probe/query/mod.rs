@@ -15,5 +15,5 @@ mod settings;
 mod tests;
 
 pub use self::look_up::Query;
-pub use self::point::{BatchVisibility, CornerWeights, QueryPoint, Visibility};
+pub use self::point::{CornerWeights, QueryPoint, Visibility};
 pub use self::settings::{Blend, DirectionWeight, QuerySettings, VisibilityTest};

@@ -29,15 +29,6 @@ pub enum Visibility {
     Exact(u8),
 }
 
-/// [`Visibility`] of many points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BatchVisibility<'m> {
-    Off,
-    Stored,
-    /// A mask for every point.
-    Exact(&'m [u8]),
-}
-
 /// The eight probes of a point, in the order of [`Grid::corner`](crate::probe::Grid::corner), with their weights, not normalised.
 #[derive(Debug, Clone, Copy)]
 pub struct CornerWeights {

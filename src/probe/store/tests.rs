@@ -24,7 +24,7 @@ fn facing(normal: Vec3) -> Facing {
 /// Two cells of 4³ voxels; the first knows three voxels of surfaces that face up, the second nothing.
 fn table() -> SurfaceVisibility {
     let up = |x: u32, y: u32, z: u32| key(UVec3::new(x, y, z), facing(Vec3::Y), 4);
-    let mut entries = vec![(up(0, 0, 0), 0b0000_0011u8), (up(1, 0, 0), 0), (up(3, 3, 3), 0b1000_0000)];
+    let mut entries = [(up(0, 0, 0), 0b0000_0011u8), (up(1, 0, 0), 0), (up(3, 3, 3), 0b1000_0000)];
     entries.sort_by_key(|entry| entry.0);
     let unseen = entries.iter().position(|entry| entry.1 == 0).unwrap() as u32;
     SurfaceVisibility {

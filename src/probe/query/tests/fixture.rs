@@ -5,7 +5,7 @@ use glam::{DVec3, UVec3, Vec2, Vec3, Vec3A};
 use crate::probe::Volume;
 use crate::probe::lattice::ProbeState;
 use crate::probe::lattice::grid::Grid;
-use crate::probe::query::{BatchVisibility, Query, QueryPoint, QuerySettings, Visibility, VisibilityTest};
+use crate::probe::query::{Query, QueryPoint, QuerySettings, Visibility, VisibilityTest};
 use crate::probe::store::encode::ColorFormat;
 use crate::probe::store::irradiance::IrradianceCurve;
 use crate::probe::store::map::OctahedralMaps;
@@ -93,22 +93,9 @@ impl Fixture {
         (corners.probes.map(|probe| probe.0), corners.weights)
     }
 
-    /// Irradiance, W·m⁻²; by a single look-up and by a batch of one, which must be the same to the last bit.
+    /// Irradiance, W·m⁻².
     pub fn look_up(&self, point: &QueryPoint, visibility: Visibility) -> [f32; 3] {
-        let single = self.query().irradiance(point, visibility);
-        let mut batch = [Vec3::ZERO];
-        let mask;
-        let many = match visibility {
-            Visibility::Off => BatchVisibility::Off,
-            Visibility::Stored => BatchVisibility::Stored,
-            Visibility::Exact(exact) => {
-                mask = [exact];
-                BatchVisibility::Exact(&mask)
-            }
-        };
-        self.query().batch(&[*point], many, &mut batch);
-        assert_eq!(single, batch[0], "single and batch differ at {point:?}, {visibility:?}");
-        single.to_array()
+        self.query().irradiance(point, visibility).to_array()
     }
 }
 

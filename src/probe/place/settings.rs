@@ -1,4 +1,8 @@
 //! What a method says about placing its probes.
+//!
+//! Where a constant has no source, its doc says what other values change: of `leak.light` and `leak.dark`, as shares of the
+//! light, of `leak.unseen`, or of the survey's rays, over two_rooms_open 1 m, office 1.5 m, courtyard 2 m, thin_wall 0.75 m,
+//! cornell 0.25 m and glossy_room 0.75 m. Changes below 1e-4 count as none.
 
 use serde::{Deserialize, Serialize};
 
@@ -49,27 +53,29 @@ impl PlacementRule {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SettleSettings {
-    /// Rays that decide about one probe.
+    /// Rays that decide about one probe. 32 or 512: at most 2e-4.
     pub rays: u32,
     /// A probe counts as inside geometry (or outside the world) when more than this share of what its rays meet are
     /// backs of surfaces, 0 to 1. Beside a sheet that has only a front nearly half of them are.
+    /// 0.25 or 0.75: at most 1e-3 (thin_wall).
     pub back_face_share: f32,
     /// Move probes that are inside geometry, or touch it, into the open where it is near.
     pub relocate: bool,
     /// Farthest that a probe is moved from its grid point. Beyond half a spacing it would be nearer to a neighbour's place
     /// than to its own; 0.45 is the bound of Majercik et al. 2021.
     pub max_move: f32,
-    /// Nearer to a surface than this, a probe is moved away from it: the surface would fill 47 % of what it sees of a wall
-    /// one spacing wide.
+    /// Nearer to a surface than this, a probe is moved away from it: a wall one spacing wide fills 46 % of what a probe at
+    /// this distance before its middle sees.
     pub min_clearance: f32,
-    /// How far from a surface a moved probe comes to lie: more than `min_clearance`, so that it is not moved again, and
-    /// less than the 0.125 that a voxel of the default table is wide, so that the surface's own voxels see it.
+    /// How far from a surface a moved probe comes to lie: beyond `min_clearance`, so that it is not moved again, and within
+    /// 0.125, the width of a voxel of the default table. 0.06: `unseen` +0.0016 in glossy_room; 0.2: −0.0011.
     pub clearance: f32,
-    /// Moves tried before a probe stays as it was.
+    /// Moves tried before a probe stays as it was. 1: `dark` +0.003 in courtyard; 8: none.
     pub max_moves: u32,
     /// How far from a surface that sees no probe one is put; half the free space where that is less.
+    /// 0.1 or 0.4: none.
     pub need_distance: f32,
-    /// Surfaces in need tried for one probe, nearest first.
+    /// Surfaces in need tried for one probe, nearest first. 3 or 48: none.
     pub need_tries: u32,
 }
 
@@ -114,20 +120,24 @@ impl SettleSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SurveySettings {
-    /// Points tried on a surface within one voxel at first.
+    /// Points tried on a surface within one voxel at first. 1: `light` +0.002 in office, `dark` +0.003 in thin_wall, for 0.63
+    /// to 0.87 × the rays; 4: at most 0.0013, for 1.2 to 1.7 ×.
     pub first_points: u32,
-    /// Points tried in all where the first ones disagree.
+    /// Points tried in all where the first ones disagree. 4 or 16: at most 5e-4.
     pub all_points: u32,
     /// Points tried on the outside of a surface until one sees any probe: where walls meet, most of a voxel's surface may
-    /// lie inside the other wall, and the strip that does not must still be found.
+    /// lie inside the other wall, and the strip that does not must still be found. 8: `dark` +3e-4 in office, for 0.73 to 0.93 ×
+    /// the rays; 128: none, for 1.1 to 1.7 ×.
     pub search_points: u32,
     /// Most search points on all triangles of a voxel's side together, as far as each still gets `all_points`/2: finely
-    /// divided surfaces need no more points than a wall of two triangles does.
+    /// divided surfaces need no more points than a wall of two triangles does. 32 or 255: none.
     pub group_search_points: u32,
     /// Voxels are taken larger by this share of their side on every side when surfaces are sorted into them, so that a
-    /// surface on the border of two is known in both, on whichever side of it rounding puts the point that asks.
+    /// surface on the border of two is known in both, on whichever side of it rounding puts the point that asks. 0: at most
+    /// 2e-4, for 0.73 to 0.91 × the rays; 0.1: `dark` +0.005 in cornell.
     pub voxel_margin: f32,
     /// Layers of probes around a cell that are searched for a probe where a surface sees none of its eight.
+    /// 1 or 5: none.
     pub far_rings: u32,
 }
 

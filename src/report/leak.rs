@@ -75,7 +75,7 @@ pub fn measure(
     let (mut hidden_weight, mut seen, mut unseen) = (0.0f64, 0.0f64, 0.0f64);
     for (i, point) in points.iter().enumerate() {
         let share = f64::from(point.weight);
-        if query.weights(&point.query(), VisibilityMode::Ray.visibility(masks[i])).total() <= 0.0 {
+        if query.weights(&point.query, VisibilityMode::Ray.visibility(masks[i])).total() <= 0.0 {
             unseen += share;
             continue;
         }
@@ -85,11 +85,11 @@ pub fn measure(
         dark += (e_exact - e).max(0.0) * share;
         total += e_exact * share;
 
-        let corners = query.weights(&point.query(), mode.visibility(masks[i]));
+        let corners = query.weights(&point.query, mode.visibility(masks[i]));
         let sum = f64::from(corners.total());
         for k in (0..8).filter(|&k| corners.weights[k] > 0.0) {
             let weight = f64::from(corners.weights[k]) / sum;
-            let contribution = luminance(query.volume.probe_irradiance(corners.probes[k], point.normal));
+            let contribution = luminance(query.volume.probe_irradiance(corners.probes[k], point.query.normal));
             let contribution = f64::from(contribution) * weight * share;
             from_all += contribution;
             if masks[i] >> k & 1 == 0 {

@@ -68,7 +68,7 @@ pub(super) fn direct_radiance(world: &World, point: &ImagePoint, transport: Refl
     match transport {
         ReflectionModel::Lambert => reflected_radiance(point.surface.albedo, point.irradiance_direct),
         ReflectionModel::Gltf => {
-            let bsdf = Bsdf::new(world, &point.surface, point.normal, point.view, transport);
+            let bsdf = Bsdf::new(world, &point.surface, point.query.normal, point.query.view, transport);
             world.punctual_radiance(&point.surface, &bsdf, salt)
         }
     }

@@ -36,7 +36,7 @@ pub fn compose(view: &View, indirect: &[Vec3]) -> LayeredImage {
     image.push("irradiance_direct", to_pixels(view, |_, p| p.irradiance_direct));
     image.push("irradiance_indirect", to_pixels(view, |i, _| indirect[i]));
     image.push("albedo", to_pixels(view, |_, p| p.surface.albedo));
-    image.push("normal", to_pixels(view, |_, p| p.normal));
+    image.push("normal", to_pixels(view, |_, p| p.query.normal));
     image.push("depth", to_pixels(view, |_, p| Vec3::splat(p.depth)));
     image
 }

@@ -21,25 +21,13 @@ pub struct ImagePoint {
     /// Share of the pixel that shows this point.
     pub weight: f32,
     pub surface: SurfacePoint,
-    /// Unit shading normal after the normal map, on the viewer's side.
-    pub normal: Vec3,
-    /// Unit, towards the viewer.
-    pub view: Vec3,
+    /// Asks with the shading normal after the normal map, on the viewer's side. Ready-made: to make it in every
+    /// look-up delays the look-ups that follow.
+    pub query: QueryPoint,
     /// Distance from the camera, metres.
     pub depth: f32,
     /// Irradiance from punctual lights, W·m⁻².
     pub irradiance_direct: Vec3,
-}
-
-impl ImagePoint {
-    pub fn query(&self) -> QueryPoint {
-        QueryPoint {
-            position: self.surface.position,
-            normal: self.normal,
-            facing: Facing::of(self.surface.geometric_normal),
-            view: self.view,
-        }
-    }
 }
 
 /// Everything a camera sees.
@@ -97,8 +85,9 @@ pub fn see_pixel(
         let surface = world.surface_at(hit, direction);
         let normal = world.bent_normal(&surface);
         let (irradiance_direct, _) = world.punctual_irradiance(&surface, normal, random.bits());
-        let depth = hit.t;
-        points.push(ImagePoint { pixel: index, weight, surface, normal, view: -direction, depth, irradiance_direct });
+        let facing = Facing::of(surface.geometric_normal);
+        let query = QueryPoint { position: surface.position, normal, facing, view: -direction };
+        points.push(ImagePoint { pixel: index, weight, surface, query, depth: hit.t, irradiance_direct });
     }
     (points, sky)
 }

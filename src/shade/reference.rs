@@ -296,8 +296,14 @@ impl<'a> Tracing<'a> {
             for _ in 0..share {
                 let mut numbers = block.sample(index);
                 index += 1;
-                let gathered =
-                    self.world.gather(&point.surface, point.normal, point.view, &path, &mut numbers, &mut counts.rays);
+                let gathered = self.world.gather(
+                    &point.surface,
+                    point.query.normal,
+                    point.query.view,
+                    &path,
+                    &mut numbers,
+                    &mut counts.rays,
+                );
                 if !(gathered.irradiance + gathered.radiance).is_finite() {
                     counts.non_finite += 1;
                     continue;
@@ -319,7 +325,7 @@ impl<'a> Tracing<'a> {
         add(Quantity::Direct, direct_radiance(self.world, point, self.settings.transport, salt));
         add(Quantity::IrradianceDirect, point.irradiance_direct);
         add(Quantity::Albedo, point.surface.albedo);
-        add(Quantity::Normal, point.normal);
+        add(Quantity::Normal, point.query.normal);
         add(Quantity::Depth, Vec3::splat(point.depth));
     }
 

@@ -63,7 +63,7 @@ pub fn exact_masks(world: &World, query: &Query, points: &[ImagePoint]) -> Vec<u
         .par_iter()
         .map(|point| {
             let origin = point.surface.ray_origin();
-            let cell = query.cell(&point.query());
+            let cell = query.cell(&point.query);
             (0..8).fold(0, |mask, i| {
                 let probe = volume.grid.corner(&cell, i);
                 let position = volume.position(probe);
@@ -79,7 +79,7 @@ pub fn exact_masks(world: &World, query: &Query, points: &[ImagePoint]) -> Vec<u
 
 /// Irradiance from the probes at every point, W·m⁻².
 pub fn irradiance(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<Vec3> {
-    points.par_iter().zip(masks).map(|(point, &mask)| query.irradiance(&point.query(), mode.visibility(mask))).collect()
+    points.par_iter().zip(masks).map(|(point, &mask)| query.irradiance(&point.query, mode.visibility(mask))).collect()
 }
 
 /// Milliseconds for querying and shading all points, one entry per run.
@@ -89,7 +89,7 @@ pub fn time_shading(query: &Query, points: &[ImagePoint], masks: &[u8], mode: Vi
         .map(|_| {
             let started = Instant::now();
             radiance.par_iter_mut().zip(points.par_iter().zip(masks)).for_each(|(out, (point, &mask))| {
-                let indirect = query.irradiance(&point.query(), mode.visibility(mask));
+                let indirect = query.irradiance(&point.query, mode.visibility(mask));
                 *out = super::layers::beauty(point, indirect);
             });
             std::hint::black_box(&radiance);
@@ -101,7 +101,7 @@ pub fn time_shading(query: &Query, points: &[ImagePoint], masks: &[u8], mode: Vi
 /// Nanoseconds of one look-up on one thread, one entry per run; none without points.
 pub fn time_lookup(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<f64> {
     let step = points.len().div_ceil(LOOKUP_POINTS).max(1);
-    let chosen: Vec<_> = points.iter().zip(masks).step_by(step).map(|(p, &mask)| (p.query(), mask)).collect();
+    let chosen: Vec<_> = points.iter().zip(masks).step_by(step).map(|(p, &mask)| (p.query, mask)).collect();
     let run = |_| {
         let started = Instant::now();
         for (point, mask) in &chosen {

@@ -63,9 +63,8 @@ pub fn exact_masks(world: &World, query: &Query, points: &[ImagePoint]) -> Vec<u
         .par_iter()
         .map(|point| {
             let origin = point.surface.ray_origin();
-            let cell = query.cell(&point.query);
-            (0..8).fold(0, |mask, i| {
-                let probe = volume.grid.corner(&cell, i);
+            let corners = volume.grid.corners_around(&query.cell(&point.query));
+            corners.into_iter().enumerate().fold(0, |mask, (i, probe)| {
                 let position = volume.position(probe);
                 // A probe behind the surface is hidden by the surface itself.
                 let visible = volume.is_active(probe)

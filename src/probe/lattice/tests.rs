@@ -19,11 +19,12 @@ proptest! {
         let grid = grid([4, 3, 5]);
         let point = Vec3::new(x, y, z);
         let cell = grid.cell(point);
-        let weight = |i: u32| {
-            let along = |bit: u32, f: f32| if i >> bit & 1 == 1 { f } else { 1.0 - f };
+        let weight = |i: usize| {
+            let along = |bit: usize, f: f32| if i >> bit & 1 == 1 { f } else { 1.0 - f };
             along(0, cell.fraction.x) * along(1, cell.fraction.y) * along(2, cell.fraction.z)
         };
-        let met: Vec3 = (0..8).map(|i| grid.grid_point(grid.corner(&cell, i)) * weight(i)).sum();
+        let corners = grid.corners_around(&cell);
+        let met: Vec3 = (0..8).map(|i| grid.grid_point(corners[i]) * weight(i)).sum();
         // A few roundings of coordinates up to 8.
         prop_assert!((met - point).abs().max_element() < 1e-5, "{met} instead of {point}");
         prop_assert!(grid.is_within(point));

@@ -7,7 +7,7 @@ use super::point::{CornerWeights, QueryPoint, Visibility};
 use super::settings::{QuerySettings, VisibilityTest};
 use crate::math::octahedral::oct_from_direction;
 use crate::probe::Volume;
-use crate::probe::lattice::grid::{Cell, ProbeIndex};
+use crate::probe::lattice::grid::Cell;
 
 /// A volume and the way to ask it.
 #[derive(Clone, Copy)]
@@ -47,6 +47,10 @@ impl<'v> Query<'v> {
     /// The shifted point P′.
     #[inline]
     fn biased(&self, point: &QueryPoint) -> Vec3 {
+        // Without a shift the cell does not wait for one to be computed.
+        if self.settings.reach() == 0.0 {
+            return point.position;
+        }
         let bias = point.normal * self.settings.normal_bias + point.view * self.settings.view_bias;
         point.position + bias * self.volume.grid.spacing_max()
     }
@@ -85,17 +89,15 @@ impl<'v> Query<'v> {
         let biased = self.biased(point);
         let cell = self.cell_of(point, biased);
         let seen = test.seen(grid, &cell, point, biased);
-        let mut out = CornerWeights { probes: [ProbeIndex(0); 8], weights: [0.0; 8] };
+        let mut out = CornerWeights { probes: grid.corners_around(&cell), weights: [0.0; 8] };
         if let Some(far) = seen.far {
             out.probes[0] = far;
             out.weights[0] = 1.0;
             return out;
         }
-        for i in 0..8 {
-            let probe = grid.corner(&cell, i);
-            out.probes[i as usize] = probe;
-            let trilinear = floored_trilinear(cell.fraction, i, settings.trilinear_floor);
-            if trilinear <= 0.0 || seen.mask >> i & 1 == 0 || !volume.is_active(probe) {
+        let trilinear = floored_trilinear(cell.fraction, settings.trilinear_floor);
+        for (i, &probe) in out.probes.iter().enumerate() {
+            if trilinear[i] <= 0.0 || seen.mask >> i & 1 == 0 || !volume.is_active(probe) {
                 continue;
             }
             let to_probe = || (volume.position(probe) - point.position).normalize_or_zero();
@@ -105,7 +107,7 @@ impl<'v> Query<'v> {
             if weight < settings.crush_below {
                 weight *= (weight / settings.crush_below).powi(2);
             }
-            out.weights[i as usize] = weight * trilinear;
+            out.weights[i] = weight * trilinear[i];
         }
         out
     }
@@ -139,9 +141,9 @@ impl<'v> Query<'v> {
     }
 }
 
-/// Trilinear weight of corner `i`, no axis below `floor`; without a floor the eight sum to 1.
+/// Trilinear weights of the eight corners, no axis below `floor`; without a floor they sum to 1.
 #[inline]
-fn floored_trilinear(fraction: Vec3, i: u32, floor: f32) -> f32 {
-    let along = |bit: u32, f: f32| (if i >> bit & 1 == 1 { f } else { 1.0 - f }).max(floor);
-    along(0, fraction.x) * along(1, fraction.y) * along(2, fraction.z)
+fn floored_trilinear(fraction: Vec3, floor: f32) -> [f32; 8] {
+    let [x, y, z] = fraction.to_array().map(|f| [(1.0 - f).max(floor), f.max(floor)]);
+    std::array::from_fn(|i| x[i & 1] * y[i >> 1 & 1] * z[i >> 2 & 1])
 }

@@ -29,7 +29,7 @@ pub enum Visibility {
     Exact(u8),
 }
 
-/// The eight probes of a point, in the order of [`Grid::corner`](crate::probe::Grid::corner), with their weights, not normalised.
+/// The eight probes of a point, in the order of [`Grid::corners_around`](crate::probe::Grid::corners_around), with their weights, not normalised.
 #[derive(Debug, Clone, Copy)]
 pub struct CornerWeights {
     pub probes: [ProbeIndex; 8],

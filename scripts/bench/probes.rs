@@ -99,7 +99,6 @@ fn filter_and_bounce(criterion: &mut Criterion) {
         settings: &config.capture,
         distance_clamp_m: None,
         hit_light: config.transport.hit_light(),
-        emitter_coverage: 0.01,
         seed: 1,
     };
     let captures: Vec<ProbeCapture> =

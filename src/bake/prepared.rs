@@ -68,7 +68,6 @@ impl Prepared<'_, '_> {
             settings: &self.config.capture,
             distance_clamp_m: clamp.map(|diagonals| diagonals * self.grid.spacing().length()),
             hit_light: self.config.transport.hit_light(),
-            emitter_coverage: self.placement.emitter_coverage,
             seed: circumstances.seed,
         }
     }

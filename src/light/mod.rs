@@ -6,6 +6,7 @@ pub mod emitters;
 pub mod ggx;
 pub mod lambert;
 pub mod path;
+pub mod places;
 pub mod punctual;
 pub mod sampled;
 pub mod surface;
@@ -13,6 +14,7 @@ pub mod surface;
 use crate::scene::{Material, Scene};
 use crate::trace::{TraceError, Tracer};
 use emitters::Emitters;
+use places::Places;
 use surface::SurfaceTable;
 
 /// A scene with all that light computations need: rays, shading data, and sampling of its emitters.
@@ -21,6 +23,7 @@ pub struct World<'s> {
     pub tracer: Tracer<'s>,
     pub emitters: Emitters,
     pub surfaces: SurfaceTable,
+    pub places: Places,
     /// Factor on all punctual lights. Some exporters multiply punctual lights by 683 but not emission; this undoes it.
     pub punctual_scale: f32,
     /// Largest albedo per channel. Larger albedos are clamped to it, so that the sum over bounces converges.
@@ -35,6 +38,7 @@ impl<'s> World<'s> {
             tracer,
             emitters: Emitters::new(scene),
             surfaces: SurfaceTable::new(scene),
+            places: Places::new(scene),
             punctual_scale,
             albedo_max,
         })

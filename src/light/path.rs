@@ -12,6 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use super::World;
 use super::bsdf::{Bsdf, ReflectionModel};
+use super::emitters::receiver::Receiver;
+use super::emitters::shares::Shares;
 use super::punctual::{Incident, incident};
 use super::sampled::RayCount;
 use super::surface::SurfacePoint;
@@ -67,6 +69,11 @@ const PAIR_SCATTER: u32 = 0;
 const PAIR_ROULETTE: u32 = 2;
 const PAIR_PUNCTUAL: u32 = 3;
 const PAIR_EMITTER: u32 = 4;
+const PAIR_WHETHER_EMITTER: u32 = 6;
+
+/// Least probability of a ray towards an emitter. A place that was not seen to be lit, or that is lit from so many
+/// directions that the path's own ray finds the light, has little use for more.
+const LEAST_EMITTER_RAYS: f32 = 0.25;
 
 impl World<'_> {
     /// One sample of the light at `point` as [`Gathered`] defines it. `view` is the unit direction towards the viewer,
@@ -81,8 +88,9 @@ impl World<'_> {
         rays: &mut RayCount,
     ) -> Gathered {
         let bsdf = Bsdf::new(self, point, normal, view, settings.transport).covering();
+        let vertex = self.vertex(point, &bsdf, settings);
         let mut gathered = Gathered::default();
-        if let Some((direction, cosine, radiance)) = self.emitter_sample(point, &bsdf, settings, 0, numbers, rays) {
+        if let Some((direction, cosine, radiance)) = self.emitter_sample(&vertex, &bsdf, settings, 0, numbers, rays) {
             let scattered = bsdf.scattered(direction, cosine);
             gathered.irradiance += radiance * cosine;
             gathered.radiance += radiance * scattered.total();
@@ -90,7 +98,7 @@ impl World<'_> {
         }
         numbers.seek(PAIR_SCATTER);
         if let Some(step) = Step::sample(point, &bsdf, numbers) {
-            let radiance = self.incoming(point.ray_origin(), &step, settings, numbers, rays) * step.density.recip();
+            let radiance = self.incoming(vertex, &step, settings, numbers, rays) * step.density.recip();
             let scattered = bsdf.scattered(step.direction, step.cosine);
             gathered.irradiance += radiance * step.cosine;
             gathered.radiance += radiance * scattered.total();
@@ -109,11 +117,29 @@ impl World<'_> {
         }
     }
 
-    /// One sample of the radiance that arrives at `origin` along `step`: the reflected light, and the emission with the
+    /// A surface point of a path.
+    #[inline]
+    fn vertex(&self, point: &SurfacePoint, bsdf: &Bsdf, settings: &PathSettings) -> Vertex<'_> {
+        let receiver = point.receiver(bsdf.normal());
+        let all_behind = || self.emitters.all_behind(receiver.position, receiver.geometric_normal);
+        if settings.strategy == Strategy::BsdfOnly || self.emitters.is_empty() || all_behind() {
+            return Vertex { receiver, shares: None };
+        }
+        let shares = self.shares_at(point);
+        let emitter_rays = match settings.strategy {
+            Strategy::LightOnly => 1.0,
+            _ if self.emitters.is_uniform_sky() => 0.0,
+            _ if !shares.lit => LEAST_EMITTER_RAYS,
+            _ => (2.0 * (1.0 - shares.cosine)).clamp(LEAST_EMITTER_RAYS, 1.0),
+        };
+        Vertex { receiver, shares: (emitter_rays > 0.0).then_some((shares, emitter_rays)) }
+    }
+
+    /// One sample of the radiance that arrives at `vertex` along `step`: the reflected light, and the emission with the
     /// weight of this technique.
     fn incoming(
         &self,
-        origin: Vec3,
+        vertex: Vertex,
         step: &Step,
         settings: &PathSettings,
         numbers: &mut BlockSample,
@@ -121,22 +147,29 @@ impl World<'_> {
     ) -> Vec3 {
         let mut sum = Vec3::ZERO;
         let mut throughput = Vec3::ONE;
-        let (mut origin, mut step) = (origin, *step);
+        let (mut vertex, mut step) = (vertex, *step);
         let mut bounce = 0;
         loop {
             rays.primary += 1;
-            let hit = self.tracer.closest(Ray::new(origin, step.direction, numbers.salt()));
+            let hit = self.tracer.closest(Ray::new(vertex.receiver.position, step.direction, numbers.salt()));
             let Some(hit) = hit else {
-                let sky = self.scene.environment.radiance(step.direction);
+                let (sky, light_density) = match vertex.shares {
+                    Some((shares, rays)) => {
+                        let (sky, density) = self.emitters.sky_along(self.scene, shares, step.direction);
+                        (sky, rays * density)
+                    }
+                    None => (self.scene.environment.radiance(step.direction), 0.0),
+                };
                 if sky != Vec3::ZERO {
-                    let light_density = self.emitters.density_of_sky(self.scene, step.direction);
                     sum += throughput * sky * settings.strategy.weight_of_hit(step.density, light_density);
                 }
                 return sum;
             };
             let point = self.surface_at(hit, step.direction);
             if point.emission != Vec3::ZERO {
-                let light_density = self.emitters.density_of_hit(origin, step.direction, &hit);
+                let light_density = vertex.shares.map_or(0.0, |(shares, rays)| {
+                    rays * self.emitters.density_of_hit(shares, &vertex.receiver, step.direction, &hit)
+                });
                 sum += throughput * point.emission * settings.strategy.weight_of_hit(step.density, light_density);
             }
             bounce += 1;
@@ -148,8 +181,9 @@ impl World<'_> {
                 return sum;
             }
             sum += throughput * self.punctual_sample(&point, &bsdf, bounce, numbers, rays);
+            vertex = self.vertex(&point, &bsdf, settings);
             if let Some((direction, cosine, radiance)) =
-                self.emitter_sample(&point, &bsdf, settings, bounce, numbers, rays)
+                self.emitter_sample(&vertex, &bsdf, settings, bounce, numbers, rays)
             {
                 sum += throughput * radiance * bsdf.scattered(direction, cosine).total();
             }
@@ -167,7 +201,6 @@ impl World<'_> {
                 }
                 throughput *= survival.recip();
             }
-            origin = point.ray_origin();
             step = next;
         }
     }
@@ -177,36 +210,37 @@ impl World<'_> {
     #[inline]
     fn emitter_sample(
         &self,
-        point: &SurfacePoint,
+        vertex: &Vertex,
         bsdf: &Bsdf,
         settings: &PathSettings,
-        vertex: u32,
+        index: u32,
         numbers: &mut BlockSample,
         rays: &mut RayCount,
     ) -> Option<(Vec3, f32, Vec3)> {
-        if settings.strategy == Strategy::BsdfOnly || self.emitters.is_empty() {
-            return None;
+        let Vertex { receiver, shares: Some((shares, emitter_rays)) } = vertex else { return None };
+        if *emitter_rays < 1.0 {
+            numbers.seek(index * PAIRS_PER_VERTEX + PAIR_WHETHER_EMITTER);
+            if numbers.uniform() >= *emitter_rays {
+                return None;
+            }
         }
-        let origin = point.ray_origin();
-        if self.emitters.all_behind(origin, point.geometric_normal) {
-            return None;
-        }
-        numbers.seek(vertex * PAIRS_PER_VERTEX + PAIR_EMITTER);
+        numbers.seek(index * PAIRS_PER_VERTEX + PAIR_EMITTER);
         let bits = std::array::from_fn(|_| numbers.bits());
-        let sample = self.emitters.sample(self.scene, origin, bits)?;
-        let cosine = bsdf.normal().dot(sample.direction);
-        if cosine <= 0.0 || point.geometric_normal.dot(sample.direction) <= 0.0 || sample.radiance == Vec3::ZERO {
+        let sample = self.emitters.sample(self.scene, shares, receiver, bits)?;
+        let cosine = receiver.cosine(sample.direction);
+        if cosine <= 0.0 || sample.radiance == Vec3::ZERO {
             return None;
         }
         rays.shadow += 1;
-        if !self.reaches(origin, &sample, numbers.salt()) {
+        if !self.reaches(receiver.position, &sample, numbers.salt()) {
             return None;
         }
+        let density = sample.density * emitter_rays;
         let weight = match settings.strategy {
-            Strategy::Mis => power_heuristic(sample.density, bsdf.density(sample.direction, cosine)),
+            Strategy::Mis => power_heuristic(density, bsdf.density(sample.direction, cosine)),
             _ => 1.0,
         };
-        Some((sample.direction, cosine, sample.radiance * (weight / sample.density)))
+        Some((sample.direction, cosine, sample.radiance * (weight / density)))
     }
 
     /// An estimate of the radiance that a vertex reflects from all punctual lights. It tests one light, which is chosen
@@ -256,6 +290,14 @@ impl World<'_> {
         let ray = Ray { t_max: incident.distance, ..Ray::new(point.ray_origin(), incident.direction, numbers.salt()) };
         if self.tracer.occluded(ray) { Vec3::ZERO } else { radiance * (self.punctual_scale * (total / importance)) }
     }
+}
+
+/// A surface point of a path, as light sampling sees it.
+#[derive(Clone, Copy)]
+struct Vertex<'w> {
+    receiver: Receiver,
+    /// What its place has learnt, and the probability of a ray towards an emitter. `None` where there are no such rays.
+    shares: Option<(&'w Shares, f32)>,
 }
 
 /// The next ray of a path.

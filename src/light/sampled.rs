@@ -1,36 +1,19 @@
 //! Irradiance from emissive surfaces and the sky, by sampling.
 //!
 //! Two techniques find this light: rays towards sampled emitters, and cosine-distributed rays. The balance heuristic
-//! (Veach & Guibas 1995) combines them. [`Allocation`] divides the samples between them; the estimate is unbiased for
-//! any division.
+//! (Veach & Guibas 1995) combines them. The place's [`Shares`] divides the samples between them; the estimate is unbiased
+//! for any division.
 
 use glam::{Vec2, Vec3};
 
 use super::World;
-use super::emitters::{LightSample, Receiver};
+use super::emitters::LightSample;
+use super::emitters::receiver::Receiver;
+use super::emitters::shares::Shares;
 use super::surface::SurfacePoint;
 use crate::math::random::{KroneckerSequence, Random};
 use crate::math::sampling::{cosine_hemisphere, cosine_hemisphere_density};
 use crate::trace::Ray;
-
-/// The division of samples between the two techniques.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Allocation {
-    /// Number of cosine-distributed rays.
-    pub cosine: u32,
-    /// Number of rays towards sampled emitters.
-    pub light: u32,
-}
-
-impl Allocation {
-    /// Divides `samples` by `coverage`, the share of all directions in which an emitter is visible. Rays towards
-    /// emitters suit small emitters, and cosine-distributed rays suit large ones. If one radiance arrives from all
-    /// directions, the latter alone have no noise.
-    pub fn by_coverage(samples: u32, coverage: f32) -> Allocation {
-        let cosine = ((samples as f32 * coverage).round() as u32).clamp(1, samples.max(1));
-        Allocation { cosine, light: samples.max(1) - cosine }
-    }
-}
 
 /// Numbers of rays traced.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -47,6 +30,16 @@ impl RayCount {
     }
 }
 
+/// Emission that a ray found.
+#[derive(Debug, Clone, Copy)]
+pub struct Emission {
+    /// Towards the ray's origin, W·m⁻²·sr⁻¹.
+    pub radiance: Vec3,
+    pub group: usize,
+    /// Density within the group, sr⁻¹.
+    pub density: f32,
+}
+
 impl World<'_> {
     /// Whether the light of `sample` reaches `origin`.
     pub fn reaches(&self, origin: Vec3, sample: &LightSample, salt: u32) -> bool {
@@ -57,87 +50,83 @@ impl World<'_> {
         !self.tracer.occluded(ray)
     }
 
-    /// One estimate of the irradiance from emitters at a surface with shading normal `normal`, W·m⁻².
+    /// One estimate of the irradiance from emitters at a surface with shading normal `normal`, W·m⁻², from this many
+    /// samples, at least one.
     pub fn emitter_irradiance(
         &self,
         point: &SurfacePoint,
         normal: Vec3,
-        allocation: Allocation,
+        samples: u32,
         random: &mut Random,
         rays: &mut RayCount,
     ) -> Vec3 {
-        let receiver = Receiver { position: point.ray_origin(), normal, geometric_normal: point.geometric_normal };
-        if self.emitters.all_behind(receiver.position, receiver.geometric_normal) {
+        if self.emitters.all_behind(point.ray_origin(), point.geometric_normal) {
             return Vec3::ZERO;
         }
-        let counts = [allocation.cosine as f32, allocation.light as f32];
+        let shares = self.shares_at(point);
+        // Rounded by chance, so that the mean is as the place asks for.
+        let cosine = ((samples.max(1) as f32 * shares.cosine + random.uniform()) as u32).min(samples.max(1));
+        self.irradiance_by(&point.receiver(normal), shares, [cosine, samples.max(1) - cosine], random, rays)
+    }
+
+    /// The same with these numbers of cosine-distributed rays and of rays towards sampled emitters.
+    pub fn irradiance_by(
+        &self,
+        receiver: &Receiver,
+        shares: &Shares,
+        [cosine_rays, light_rays]: [u32; 2],
+        random: &mut Random,
+        rays: &mut RayCount,
+    ) -> Vec3 {
+        let counts = [cosine_rays as f32, light_rays as f32];
         let mut sum = Vec3::ZERO;
-        for i in 0..allocation.cosine {
+        for i in 0..cosine_rays {
             // Stratified along the first axis only.
             let u = Vec2::new((i as f32 + random.uniform()) / counts[0], random.uniform());
-            let direction = cosine_hemisphere(normal, u);
-            let cosine = normal.dot(direction);
-            if receiver.geometric_normal.dot(direction).min(cosine) <= 0.0 {
+            let direction = cosine_hemisphere(receiver.normal, u);
+            let cosine = receiver.cosine(direction);
+            if cosine <= 0.0 {
                 continue;
             }
             rays.shadow += 1;
-            let (radiance, light_density) = self.emitted_along(Ray::new(receiver.position, direction, random.bits()));
-            if radiance != Vec3::ZERO {
+            if let Some(found) = self.emission_along(receiver, Ray::new(receiver.position, direction, random.bits())) {
+                let light_density = shares.of(found.group) * found.density;
                 let density = counts[0] * cosine_hemisphere_density(cosine) + counts[1] * light_density;
-                sum += radiance * (cosine / density);
+                sum += found.radiance * (cosine / density);
             }
         }
-        for bits in KroneckerSequence::new(random).take(allocation.light as usize) {
-            if let Some(sample) = self.emitters.irradiance_sample(self.scene, &receiver, counts, bits) {
-                rays.shadow += 1;
-                let ray = match sample.target {
-                    Ok(target) => Ray::segment(receiver.position, target, bits[0]),
-                    Err(direction) => Ray::new(receiver.position, direction, bits[0]),
-                };
-                if !self.tracer.occluded(ray) {
-                    sum += sample.irradiance;
-                }
+        for bits in KroneckerSequence::new(random).take(light_rays as usize) {
+            let Some(sample) = self.emitters.sample(self.scene, shares, receiver, bits) else { continue };
+            let cosine = receiver.cosine(sample.direction);
+            if cosine <= 0.0 || sample.radiance == Vec3::ZERO {
+                continue;
+            }
+            rays.shadow += 1;
+            if self.reaches(receiver.position, &sample, bits[0]) {
+                let density = counts[0] * cosine_hemisphere_density(cosine) + counts[1] * sample.density;
+                sum += sample.radiance * (cosine / density);
             }
         }
         sum
     }
 
-    /// Radiance that the ray's first hit, or the sky, emits towards the ray's origin; and the density, sr⁻¹, with which
-    /// sampling of emitters draws the same direction. The ray's direction has unit length.
-    fn emitted_along(&self, ray: Ray) -> (Vec3, f32) {
+    /// What the ray's first hit, or the sky, emits towards the ray's origin. `None` where that is nothing. The ray's direction
+    /// has unit length.
+    pub fn emission_along(&self, receiver: &Receiver, ray: Ray) -> Option<Emission> {
         let sky = || {
-            let radiance = self.scene.environment.radiance(ray.direction);
-            (radiance, self.emitters.density_of_sky(self.scene, ray.direction))
+            let (radiance, group, density) = self.emitters.sky_group_along(self.scene, ray.direction)?;
+            (radiance != Vec3::ZERO).then_some(Emission { radiance, group, density })
         };
         if self.emitters.triangle_count() == 0 {
             // No surface emits, so any hit means no light.
-            return if self.tracer.occluded(ray) { (Vec3::ZERO, 0.0) } else { sky() };
+            return if self.tracer.occluded(ray) { None } else { sky() };
         }
         let Some(hit) = self.tracer.closest(ray) else { return sky() };
         let radiance = self.emission_towards(&hit, ray.direction);
         if radiance == Vec3::ZERO {
-            return (radiance, 0.0);
+            return None;
         }
-        (radiance, self.emitters.density_of_hit(ray.origin, ray.direction, &hit))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn allocations_keep_the_number_of_samples() {
-        for samples in [1, 2, 7, 64] {
-            for coverage in [0.0, 0.01, 0.3, 1.0] {
-                let Allocation { cosine, light } = Allocation::by_coverage(samples, coverage);
-                assert_eq!(cosine + light, samples);
-                // At least one cosine-distributed ray finds what sampling emitters cannot.
-                assert!(cosine >= 1);
-            }
-            assert_eq!(Allocation::by_coverage(samples, 1.0).light, 0);
-        }
-        assert_eq!(Allocation::by_coverage(64, 0.25), Allocation { cosine: 16, light: 48 });
-        assert_eq!(Allocation::by_coverage(0, 0.5), Allocation { cosine: 1, light: 0 });
+        let (group, density) = self.emitters.group_of_hit(receiver, ray.direction, &hit)?;
+        Some(Emission { radiance, group, density })
     }
 }

@@ -4,6 +4,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::World;
+use super::emitters::receiver::Receiver;
 use crate::scene::{Scene, TriangleIndex};
 use crate::trace::offset::ray_offset;
 use crate::trace::{Hit, Ray};
@@ -47,6 +48,11 @@ impl SurfacePoint {
     /// Start of rays that leave the surface on the viewer's side.
     pub fn ray_origin(&self) -> Vec3 {
         self.position + self.geometric_normal * self.ray_offset
+    }
+
+    /// The point as a receiver of light, with this shading normal.
+    pub fn receiver(&self, normal: Vec3) -> Receiver {
+        Receiver { position: self.ray_origin(), normal, geometric_normal: self.geometric_normal }
     }
 
     /// Whether the ray hit the back of a surface that is not double-sided. Such a hit suggests that the ray's origin

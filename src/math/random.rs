@@ -20,6 +20,8 @@ pub enum Purpose {
     Path = 5,
     /// Paths from the points that capture rays hit.
     ProbePaths = 6,
+    /// Rays by which places learn which emitters they see.
+    Places = 7,
     /// Noise added to a reference, to measure how the reference's own noise changes FLIP.
     FlipReplicate = 16,
 }

@@ -12,6 +12,7 @@ mod lookup;
 pub mod material;
 pub mod mesh;
 mod options;
+pub mod range;
 mod texture;
 
 pub use camera::Camera;

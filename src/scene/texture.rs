@@ -14,7 +14,7 @@ static LINEAR_FROM_SRGB8: LazyLock<[f32; 256]> =
 impl Texture {
     /// Linear RGBA of one texel. The indices must be in range.
     #[inline]
-    fn texel(&self, x: u32, y: u32) -> Vec4 {
+    pub(super) fn texel(&self, x: u32, y: u32) -> Vec4 {
         let i = y as usize * self.width as usize + x as usize;
         match &self.texels {
             Texels::Rgba32F(data) => data[i],

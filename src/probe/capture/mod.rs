@@ -14,9 +14,10 @@ use self::rays::{Layout, TexelRay};
 pub use self::rays::{OctahedralRays, Rays};
 use self::surfel::Surfel;
 use crate::light::World;
+use crate::light::emitters::receiver::Receiver;
 use crate::light::lambert::reflected_radiance;
 use crate::light::path::PathSettings;
-use crate::light::sampled::{Allocation, RayCount};
+use crate::light::sampled::RayCount;
 use crate::light::surface::SurfacePoint;
 use crate::math::blocks::{BLOCK, Block};
 use crate::math::random::{KroneckerSequence, Purpose, Random};
@@ -109,8 +110,6 @@ pub struct Capture<'w, 's> {
     /// Distances beyond count as this, and so do misses, metres; `None` where no one asks for distances.
     pub distance_clamp_m: Option<f32>,
     pub hit_light: HitLight,
-    /// Share of directions in which emitters are seen.
-    pub emitter_coverage: f32,
     pub seed: u64,
 }
 
@@ -120,25 +119,34 @@ impl Capture<'_, '_> {
     }
 
     /// Emitter samples at every hit.
-    fn surface_allocation(&self) -> Option<Allocation> {
-        // A sky of one radiance is sampled best by the cosine alone.
-        let coverage = if self.world.emitters.is_uniform_sky() { 1.0 } else { self.emitter_coverage };
-        self.samples_emitters().then(|| Allocation::by_coverage(self.settings.emitter_samples, coverage))
+    fn surface_samples(&self) -> Option<u32> {
+        self.samples_emitters().then_some(self.settings.emitter_samples)
     }
 
-    /// Emitter samples at a probe centre: fewer, the more of the sphere emits, for the capture's own rays find it then.
-    fn probe_samples(&self) -> u32 {
+    /// Emitter samples at a probe's centre, as its surroundings have taught it. `None` where there are none.
+    fn centre(&self, index: usize, position: Vec3) -> Option<Centre> {
         // The capture's own rays are even denser samples of a sky of one radiance.
-        if !self.samples_emitters() || self.world.emitters.is_uniform_sky() {
-            return 0;
+        let samples = self.settings.probe_emitter_samples;
+        if samples == 0 || !self.samples_emitters() || self.world.emitters.is_uniform_sky() {
+            return None;
         }
-        Allocation::by_coverage(self.settings.probe_emitter_samples, self.emitter_coverage).light
+        let receiver = Receiver::in_space(position);
+        let mut random = Random::new(self.seed, Purpose::Places, index as u64, 1);
+        let shares = self.world.learn(&[receiver], &mut random);
+        let draws = (0..self.world.emitters.groups()).map(|group| {
+            let expected = samples as f32 * shares.of(group);
+            let count = (expected + random.uniform()) as u32;
+            // Where there is at least one draw, the estimate may know how many there were.
+            Draws { count, expected: if expected >= 1.0 { count as f32 } else { expected } }
+        });
+        Some(Centre { receiver, draws: draws.collect() })
     }
 
     /// Captures the probe at `position`. Depends on nothing but the arguments and `self`.
     pub fn probe(&self, index: usize, position: Vec3, contains: impl Fn(Vec3) -> bool) -> ProbeCapture {
         let (texels, count) = (self.settings.rays.texels(), self.settings.rays.count());
-        let (allocation, light_samples) = (self.surface_allocation(), self.probe_samples());
+        let (surface_samples, centre) = (self.surface_samples(), self.centre(index, position));
+        let centre = centre.as_ref();
         let world = self.world;
         let mut out = ProbeCapture {
             texels,
@@ -159,10 +167,10 @@ impl Capture<'_, '_> {
             lit.clear();
             for (ray, hit) in rays.iter().zip(&hits) {
                 match hit {
-                    None => self.meet_sky(ray, light_samples, &mut out),
+                    None => self.meet_sky(ray, centre, &mut out),
                     Some(hit) => {
                         let surface = world.surface_at(*hit, ray.direction);
-                        self.meet_surface(position, ray, &surface, light_samples, &mut out);
+                        self.meet_surface(ray, &surface, centre, &mut out);
                         out.hits_outside_volume += u64::from(!contains(surface.position));
                         // What reflects nothing no bounce will ever ask for.
                         if surface.albedo != Vec3::ZERO {
@@ -174,31 +182,31 @@ impl Capture<'_, '_> {
             for (ray, surface) in &lit {
                 match self.hit_light {
                     HitLight::None => {}
-                    HitLight::Direct => self.light(ray, surface, allocation, &mut random, &mut out),
+                    HitLight::Direct => self.light(ray, surface, surface_samples, &mut random, &mut out),
                     HitLight::Paths(paths) => self.light_by_paths(index, ray, surface, paths, &mut out),
                 }
             }
         }
         out.rays.primary += count as u64;
-        self.sample_emitters(index, position, light_samples, &layout, &mut out);
+        if let Some(centre) = centre {
+            self.sample_emitters(index, centre, &layout, &mut out);
+        }
         out.surfels.shrink_to_fit();
         out
     }
 
-    /// Share of the radiance along a capture ray that counts, beside `light_samples` emitter samples drawn from the
-    /// probe's centre with `light_density` (balance heuristic).
-    fn gathered_share(&self, ray: &TexelRay, light_samples: u32, light_density: f32) -> f32 {
-        ray.density / (ray.density + light_samples as f32 * light_density)
-    }
-
     /// A capture ray that leaves the scene.
-    fn meet_sky(&self, ray: &TexelRay, light_samples: u32, out: &mut ProbeCapture) {
-        let (scene, emitters) = (self.world.scene, &self.world.emitters);
-        let radiance = scene.environment.radiance(ray.direction);
+    fn meet_sky(&self, ray: &TexelRay, centre: Option<&Centre>, out: &mut ProbeCapture) {
+        let scene = self.world.scene;
+        let (radiance, expected) = match centre {
+            Some(centre) => match self.world.emitters.sky_group_along(scene, ray.direction) {
+                Some((radiance, group, density)) => (radiance, centre.draws[group].expected * density),
+                None => (Vec3::ZERO, 0.0),
+            },
+            None => (scene.environment.radiance(ray.direction), 0.0),
+        };
         if radiance != Vec3::ZERO {
-            let gathered =
-                self.gathered_share(ray, light_samples, emitters.density_of_sky(scene, ray.direction)) * ray.share;
-            out.emitted.push((ray.texel, radiance * gathered));
+            out.emitted.push((ray.texel, radiance * (gathered_share(ray, expected) * ray.share)));
         }
         if let Some(clamp) = self.distance_clamp_m {
             out.distances[ray.texel as usize].add(f64::from(clamp), f64::from(ray.share));
@@ -207,21 +215,17 @@ impl Capture<'_, '_> {
 
     /// Distance and emission of what a capture ray hits.
     #[inline]
-    fn meet_surface(
-        &self,
-        position: Vec3,
-        ray: &TexelRay,
-        surface: &SurfacePoint,
-        light_samples: u32,
-        out: &mut ProbeCapture,
-    ) {
+    fn meet_surface(&self, ray: &TexelRay, surface: &SurfacePoint, centre: Option<&Centre>, out: &mut ProbeCapture) {
         if let Some(clamp) = self.distance_clamp_m {
             out.distances[ray.texel as usize].add(f64::from(surface.hit.t.min(clamp)), f64::from(ray.share));
         }
         if surface.emission != Vec3::ZERO {
-            let light_density = self.world.emitters.density_of_hit(position, ray.direction, &surface.hit);
-            let gathered = self.gathered_share(ray, light_samples, light_density) * ray.share;
-            out.emitted.push((ray.texel, surface.emission * gathered));
+            let emitters = &self.world.emitters;
+            let expected = centre.map_or(0.0, |Centre { receiver, draws }| {
+                let found = emitters.group_of_hit(receiver, ray.direction, &surface.hit);
+                found.map_or(0.0, |(group, density)| draws[group].expected * density)
+            });
+            out.emitted.push((ray.texel, surface.emission * (gathered_share(ray, expected) * ray.share)));
         }
     }
 
@@ -231,7 +235,7 @@ impl Capture<'_, '_> {
         &self,
         ray: &TexelRay,
         surface: &SurfacePoint,
-        allocation: Option<Allocation>,
+        samples: Option<u32>,
         random: &mut Random,
         out: &mut ProbeCapture,
     ) {
@@ -239,8 +243,8 @@ impl Capture<'_, '_> {
         let normal = surface.shading_normal;
         let (punctual, shadow_rays) = world.punctual_irradiance(surface, normal, random.bits());
         out.rays.shadow += u64::from(shadow_rays);
-        let sampled = match allocation {
-            Some(allocation) => world.emitter_irradiance(surface, normal, allocation, random, &mut out.rays),
+        let sampled = match samples {
+            Some(samples) => world.emitter_irradiance(surface, normal, samples, random, &mut out.rays),
             None => Vec3::ZERO,
         };
         let mut direct = reflected_radiance(surface.albedo, punctual + sampled);
@@ -276,21 +280,44 @@ impl Capture<'_, '_> {
     }
 
     /// Draws emitters from the probe's centre.
-    fn sample_emitters(&self, index: usize, position: Vec3, count: u32, layout: &Layout, out: &mut ProbeCapture) {
+    fn sample_emitters(&self, index: usize, centre: &Centre, layout: &Layout, out: &mut ProbeCapture) {
         let world = self.world;
+        let Centre { receiver, draws } = centre;
         let mut random = Random::new(self.seed, Purpose::ProbeEmission, index as u64, 0);
-        for bits in KroneckerSequence::new(&mut random).take(count as usize) {
-            let Some(sample) = world.emitters.sample(world.scene, position, bits) else { continue };
-            if sample.radiance == Vec3::ZERO {
-                continue;
-            }
-            out.rays.shadow += 1;
-            if world.reaches(position, &sample, bits[0]) {
-                let density = layout.density(sample.direction) + count as f32 * sample.density;
-                out.emitter_samples.push((sample.direction, sample.radiance / density));
+        for (group, Draws { count, expected }) in draws.iter().enumerate().filter(|(_, draws)| draws.count > 0) {
+            for bits in KroneckerSequence::new(&mut random).take(*count as usize) {
+                let Some(sample) = world.emitters.sample_group(world.scene, group, receiver, bits) else { continue };
+                if sample.radiance == Vec3::ZERO {
+                    continue;
+                }
+                out.rays.shadow += 1;
+                if world.reaches(receiver.position, &sample, bits[0]) {
+                    let density = layout.density(sample.direction) + expected * sample.density;
+                    out.emitter_samples.push((sample.direction, sample.radiance / density));
+                }
             }
         }
     }
+}
+
+/// A probe's centre, from which emitters are sampled.
+struct Centre {
+    receiver: Receiver,
+    /// Per group of emitters.
+    draws: Vec<Draws>,
+}
+
+/// Draws from one group.
+struct Draws {
+    count: u32,
+    /// Their number as the estimate counts it: its mean is that of `count`.
+    expected: f32,
+}
+
+/// Share of the radiance along a capture ray that counts, where this many emitter samples per solid angle are expected in
+/// its direction, sr⁻¹ (balance heuristic).
+fn gathered_share(ray: &TexelRay, expected: f32) -> f32 {
+    ray.density / (ray.density + expected)
 }
 
 impl ProbeCapture {

@@ -17,8 +17,6 @@ pub struct Placement {
     pub sampled: Vec<bool>,
     /// Probes moved from their grid points.
     pub relocated: usize,
-    /// Share of the active probes' rays that end on an emitting surface or in the sky.
-    pub emitter_coverage: f32,
     /// What surfaces see of their probes; `None` where the method does not ask.
     pub survey: Option<SurfaceVisibility>,
     pub rays: u64,

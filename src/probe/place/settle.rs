@@ -17,7 +17,6 @@ pub struct Surroundings {
     rays: u64,
     hits: u64,
     backs: u64,
-    emitting: u64,
     /// Distance and direction of the nearest back, and of the nearest front.
     nearest_back: (f32, Vec3),
     nearest_front: (f32, Vec3),
@@ -26,7 +25,7 @@ pub struct Surroundings {
 impl Default for Surroundings {
     fn default() -> Self {
         let nothing = (f32::INFINITY, Vec3::ZERO);
-        Surroundings { rays: 0, hits: 0, backs: 0, emitting: 0, nearest_back: nothing, nearest_front: nothing }
+        Surroundings { rays: 0, hits: 0, backs: 0, nearest_back: nothing, nearest_front: nothing }
     }
 }
 
@@ -35,7 +34,6 @@ impl Default for Surroundings {
 struct Settled {
     state: ProbeState,
     position: Vec3,
-    around: Surroundings,
     /// Rays of all positions tried.
     rays: u64,
     moved: bool,
@@ -49,26 +47,17 @@ pub fn settle_all(world: &World, task: &PlacementTask) -> Placement {
     let of_probe = |probe: usize| -> Settled {
         let position = grid.grid_point(crate::probe::ProbeIndex(probe as u32));
         if !sampled[probe] && !settings.keep_unsampled {
-            let around = Surroundings::default();
-            return Settled { state: ProbeState::NeverSampled, position, around, rays: 0, moved: false };
+            return Settled { state: ProbeState::NeverSampled, position, rays: 0, moved: false };
         }
         match &settings.rule {
             PlacementRule::Settle(rule) => Settler { world, grid, settings: rule }.settle(position),
-            PlacementRule::GridPoints => {
-                let around = Settler { world, grid, settings: &SettleSettings::default() }.look(position);
-                Settled { state: ProbeState::Active, position, around, rays: around.rays, moved: false }
-            }
+            PlacementRule::GridPoints => Settled { state: ProbeState::Active, position, rays: 0, moved: false },
         }
     };
     let found: Vec<Settled> = (0..grid.probe_count()).into_par_iter().map(of_probe).collect();
     let active = || found.iter().zip(&sampled).filter(|(f, _)| f.state == ProbeState::Active);
-    // Only of those that matter: keeping the others must not change how samples are divided.
-    let counted = || active().filter(|(_, sampled)| **sampled);
-    let seen: u64 = counted().map(|(f, _)| f.around.rays).sum();
-    let emitting: u64 = counted().map(|(f, _)| f.around.emitting).sum();
     Placement {
         relocated: active().filter(|(f, _)| f.moved).count(),
-        emitter_coverage: if seen > 0 { emitting as f32 / seen as f32 } else { 0.0 },
         rays: found.iter().map(|f| f.rays).sum(),
         states: found.iter().map(|f| f.state).collect(),
         positions: found.iter().map(|f| f.position).collect(),
@@ -97,11 +86,9 @@ impl Settler<'_, '_> {
         for i in 0..count {
             let direction = fibonacci::direction(i, count);
             let Some(surface) = self.world.surface(Ray::new(position, direction, i as u32)) else {
-                found.emitting += u64::from(self.world.emitters.has_sky());
                 continue;
             };
             found.hits += 1;
-            found.emitting += u64::from(surface.emission != Vec3::ZERO);
             let nearest = if surface.is_back() {
                 found.backs += 1;
                 &mut found.nearest_back
@@ -156,8 +143,8 @@ impl Settler<'_, '_> {
         }
         if self.is_inside(&best_around) {
             let state = ProbeState::InsideGeometry;
-            return Settled { state, position: grid_point, around: best_around, rays, moved };
+            return Settled { state, position: grid_point, rays, moved };
         }
-        Settled { state: ProbeState::Active, position: best, around: best_around, rays, moved }
+        Settled { state: ProbeState::Active, position: best, rays, moved }
     }
 }

@@ -46,8 +46,6 @@ impl Truth {
                 settings,
                 distance_clamp_m: None,
                 hit_light: HitLight::Paths(paths),
-                // Divides samples between techniques; any division has the same mean.
-                emitter_coverage: 0.0,
                 seed: seed.wrapping_add((run + 1).wrapping_mul(SEED_STEP)),
             };
             let probe = |p: usize| -> Vec<Vec3A> {

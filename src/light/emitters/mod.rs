@@ -1,0 +1,188 @@
+//! Sampling of emissive triangles and of the sky.
+//!
+//! Emitters come in groups: subtrees of a [`tree`] over emissive triangles, and bins of the [`sky`]. A [`Shares`] says how
+//! often a place draws from each group. Within a group the tree chooses a triangle by what it may send to the point, and
+//! points on it are uniform by area; texels of a sky map are chosen in proportion to their power.
+//!
+//! Multiple importance sampling needs two functions: one draws a sample, the other gives the density of samples along a
+//! given ray. Both stand here together.
+
+mod cone;
+pub mod receiver;
+pub mod shares;
+mod sky;
+mod tree;
+mod triangle;
+
+use glam::{Vec2, Vec3};
+
+use self::receiver::Receiver;
+use self::shares::Shares;
+use self::sky::Sky;
+use self::tree::LightTree;
+use self::triangle::Pieces;
+use crate::math::random::unit_from_bits;
+use crate::math::sampling::triangle_barycentric;
+use crate::scene::Scene;
+use crate::trace::Hit;
+
+/// A sampled direction towards an emitter.
+#[derive(Debug, Clone, Copy)]
+pub struct LightSample {
+    /// Unit.
+    pub direction: Vec3,
+    /// End of the shadow segment. `None` for the sky.
+    pub target: Option<Vec3>,
+    /// Radiance emitted towards the point × the emitter's opacity, W·m⁻²·sr⁻¹.
+    pub radiance: Vec3,
+    /// Density with which this direction is drawn, sr⁻¹.
+    pub density: f32,
+}
+
+/// The emissive triangles and the sky, prepared for sampling.
+pub struct Emitters {
+    pieces: Pieces,
+    tree: LightTree,
+    sky: Option<Sky>,
+    /// Box around all emissive triangles. Its lower corner lies above its upper corner if no triangle emits.
+    bounds: (Vec3, Vec3),
+}
+
+impl Emitters {
+    pub fn new(scene: &Scene) -> Emitters {
+        let pieces = Pieces::new(scene);
+        let boxes = || pieces.bounds.iter();
+        let low = boxes().map(|b| b.low).fold(Vec3::INFINITY, Vec3::min);
+        let high = boxes().map(|b| b.high).fold(Vec3::NEG_INFINITY, Vec3::max);
+        let tree = LightTree::new(&pieces.bounds);
+        Emitters { tree, pieces, sky: Sky::new(&scene.environment), bounds: (low, high) }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.groups() == 0
+    }
+
+    /// Number of emissive triangles.
+    pub fn triangle_count(&self) -> usize {
+        self.pieces.triangles
+    }
+
+    pub fn has_sky(&self) -> bool {
+        self.sky.is_some()
+    }
+
+    /// Number of groups: those of triangles, then those of the sky.
+    pub fn groups(&self) -> usize {
+        self.tree.groups() + self.sky.as_ref().map_or(0, Sky::bins)
+    }
+
+    /// Whether every emitter lies behind the plane through `point` with this normal. No sample can then bring light.
+    pub fn all_behind(&self, point: Vec3, normal: Vec3) -> bool {
+        let (low, high) = self.bounds;
+        let foremost = Vec3::select(normal.cmpge(Vec3::ZERO), high, low);
+        // Without triangles the left side is NaN, so the comparison is false.
+        let any_in_front = (foremost - point).dot(normal) > 0.0;
+        self.sky.is_none() && !any_in_front
+    }
+
+    /// Whether the only emitter is a sky of constant radiance. Cosine-distributed rays are then the best samples.
+    pub fn is_uniform_sky(&self) -> bool {
+        self.pieces.all.is_empty() && self.sky.as_ref().is_some_and(Sky::is_uniform)
+    }
+
+    /// Luminance of the irradiance that a group may send to the receiver if nothing occludes it: an estimate, and 0 only
+    /// where it sends none.
+    pub fn importance(&self, group: usize, receiver: &Receiver) -> f32 {
+        match (group.checked_sub(self.tree.groups()), &self.sky) {
+            (Some(bin), Some(sky)) => sky.importance(bin, receiver),
+            _ => self.tree.importance(group, receiver),
+        }
+    }
+
+    /// Turns uniform random bits into a direction from `receiver` towards an emitter. `None` if the emitter cannot light
+    /// the point.
+    #[inline]
+    pub fn sample(&self, scene: &Scene, shares: &Shares, receiver: &Receiver, bits: [u32; 4]) -> Option<LightSample> {
+        let (group, share) = shares.draw(unit_from_bits(bits[0]));
+        let sample = self.sample_group(scene, group, receiver, bits)?;
+        Some(LightSample { density: sample.density * share, ..sample })
+    }
+
+    /// The same with an emitter of one group, and with the density within it. The first word's upper 24 bits are not used.
+    #[inline]
+    pub fn sample_group(
+        &self,
+        scene: &Scene,
+        group: usize,
+        receiver: &Receiver,
+        [spare, word, u, v]: [u32; 4],
+    ) -> Option<LightSample> {
+        let place = Vec2::new(unit_from_bits(u), unit_from_bits(v));
+        if let (Some(bin), Some(sky)) = (group.checked_sub(self.tree.groups()), &self.sky) {
+            // The lowest 8 bits of three words, which numbers of 24 bits leave over.
+            let second = spare << 24 | (u & 0xFF) << 16 | (v & 0xFF) << 8;
+            let found = sky.sample(&scene.environment, bin, [word, second], place)?;
+            return Some(LightSample {
+                direction: found.direction,
+                target: None,
+                radiance: found.radiance,
+                density: found.density,
+            });
+        }
+        // 32 bits, all below 1.
+        let number = f64::from(word) / 2f64.powi(32);
+        let (piece, probability) = self.tree.draw(group, receiver, number)?;
+        let triangle = &self.pieces.all[piece];
+        let within = triangle_barycentric(place);
+        let on_triangle = triangle.point(within);
+        let to_target = on_triangle - receiver.position;
+        let distance_squared = to_target.length_squared();
+        let direction = to_target * distance_squared.sqrt().recip();
+        let cosine = -triangle.normal.dot(direction);
+        if cosine <= 0.0 && !triangle.double_sided {
+            return None;
+        }
+        // The density is not finite if the point lies on the emitter or in its plane.
+        let density = probability * triangle.per_area * distance_squared / cosine.abs();
+        if !density.is_finite() {
+            return None;
+        }
+        let target = triangle.shadow_target(receiver.position, on_triangle, cosine);
+        Some(LightSample { direction, target: Some(target), radiance: triangle.radiance(scene, within), density })
+    }
+
+    /// Density, sr⁻¹, with which [`Self::sample`] draws the unit `direction` from `receiver` to this hit.
+    #[inline]
+    pub fn density_of_hit(&self, shares: &Shares, receiver: &Receiver, direction: Vec3, hit: &Hit) -> f32 {
+        self.group_of_hit(receiver, direction, hit).map_or(0.0, |(group, density)| shares.of(group) * density)
+    }
+
+    /// The group that a hit belongs to, and the density of its direction within it, sr⁻¹. `None` where it does not emit.
+    #[inline]
+    pub fn group_of_hit(&self, receiver: &Receiver, direction: Vec3, hit: &Hit) -> Option<(usize, f32)> {
+        let (piece, triangle) = self.pieces.at(hit.triangle, hit.barycentric)?;
+        let cosine = triangle.normal.dot(direction).abs();
+        let distance_squared = hit.t * hit.t;
+        let density = triangle.per_area * distance_squared / cosine;
+        Some((self.tree.group_of(piece), self.tree.probability(piece, receiver) * density))
+    }
+
+    /// Radiance of the sky along a unit `direction`, and the density, sr⁻¹, with which [`Self::sample`] draws it.
+    #[inline]
+    pub fn sky_along(&self, scene: &Scene, shares: &Shares, direction: Vec3) -> (Vec3, f32) {
+        match self.sky_group_along(scene, direction) {
+            Some((radiance, group, density)) => (radiance, shares.of(group) * density),
+            None => (Vec3::ZERO, 0.0),
+        }
+    }
+
+    /// Radiance of the sky along a unit `direction`, its group, and the density within it, sr⁻¹. `None` without a sky.
+    #[inline]
+    pub fn sky_group_along(&self, scene: &Scene, direction: Vec3) -> Option<(Vec3, usize, f32)> {
+        let (radiance, bin, density) = self.sky.as_ref()?.along(&scene.environment, direction);
+        Some((radiance, self.tree.groups() + bin, density))
+    }
+}
+
+#[cfg(test)]
+mod tests;

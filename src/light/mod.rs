@@ -5,6 +5,7 @@ pub mod bsdf;
 pub mod emitters;
 pub mod ggx;
 pub mod lambert;
+pub mod learn;
 pub mod path;
 pub mod places;
 pub mod punctual;

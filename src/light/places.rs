@@ -1,58 +1,26 @@
-//! What places have learnt of the emitters: which of them they see.
+//! Places: surface points of a cell that face the same main direction. What such points know of the light they share.
 //!
-//! The scene's box is divided into cells. All surface points of a cell that face the same main direction are a place, and
-//! share their [`Shares`]. A place learns when it is first asked for: some points of it send rays towards every group of
-//! emitters that may light it, and cosine-distributed rays. What a place learns depends on the scene alone, so neither the
-//! seed nor the order of threads has an effect; and every group keeps a positive share, so estimates stay unbiased.
+//! The scene's box is divided into cells. What a place learns, see [`super::learn`], it learns when it is first asked for.
 
 use std::sync::OnceLock;
 
-use glam::{UVec3, Vec2, Vec3};
+use glam::{UVec3, Vec3};
 
-use super::World;
-use super::emitters::receiver::Receiver;
 use super::emitters::shares::Shares;
 use super::surface::SurfacePoint;
-use crate::math::color::luminance;
-use crate::math::random::{Purpose, Random};
-use crate::math::sampling::{UNIFORM_SPHERE_DENSITY, cosine_hemisphere, cosine_hemisphere_density, uniform_sphere};
 use crate::scene::Scene;
-use crate::trace::Ray;
 
 /// About how many cells the scene's box has.
-const CELLS: f64 = 4096.0;
-
-/// Cells are larger than their volume by this share of their side on every side when they look for points: surfaces that
-/// lie on a border belong to either cell by rounding.
-const OVERLAP: f32 = 0.1;
-
-/// Points that a place learns from, and rays that look for each.
-const POINTS: usize = 8;
-const TRIES: usize = 4;
-
-/// Groups that a place sends rays to: those that may send most light.
-const TESTED: usize = 32;
-
-/// Rays towards emitters in all, as far as [`RAYS_PER_GROUP`] allows, and cosine-distributed rays.
-const LIGHT_RAYS: usize = 96;
-const RAYS_PER_GROUP: [usize; 2] = [3, 16];
-const COSINE_RAYS: usize = 32;
-
-/// Share of draws that does not follow what was learnt: half of it follows what may arrive if nothing occludes it, half
-/// is even over all groups. It bounds the noise where few rays have learnt something wrong.
-const DEFENSIVE: f64 = 0.1;
-
-/// The shares of cosine-distributed samples that are tried.
-const COSINE_SHARES: [f32; 5] = [0.125, 0.25, 0.5, 0.75, 0.875];
+const CELLS: f64 = 2048.0;
 
 /// All places of a scene.
 pub struct Places {
     low: Vec3,
     /// Sides of a cell, metres.
-    cell: Vec3,
+    pub cell: Vec3,
     cells: UVec3,
     /// Six per cell, one per main direction.
-    learnt: Vec<OnceLock<Box<Shares>>>,
+    shares: Vec<OnceLock<Box<Shares>>>,
 }
 
 impl Places {
@@ -65,12 +33,12 @@ impl Places {
         let side = (volume / CELLS).cbrt() as f32;
         let cells = (size / side).ceil().max(Vec3::ONE).as_uvec3().min(UVec3::splat(CELLS as u32));
         let count = cells.to_array().iter().map(|&n| n as usize).product::<usize>();
-        Places { low, cell: size / cells.as_vec3(), cells, learnt: (0..6 * count).map(|_| OnceLock::new()).collect() }
+        Places { low, cell: size / cells.as_vec3(), cells, shares: (0..6 * count).map(|_| OnceLock::new()).collect() }
     }
 
     /// The cell that holds a position, and the main direction of a normal.
     #[inline]
-    fn key(&self, position: Vec3, normal: Vec3) -> usize {
+    pub fn key(&self, position: Vec3, normal: Vec3) -> usize {
         // `as` truncates, saturates and sends NaN to 0.
         let cell = ((position - self.low) / self.cell).max(Vec3::ZERO).as_uvec3().min(self.cells - UVec3::ONE);
         let axis = normal.abs().max_position();
@@ -79,154 +47,23 @@ impl Places {
         index as usize * 6 + facing
     }
 
+    /// Key of a surface point's place.
+    #[inline]
+    pub fn key_of(&self, point: &SurfacePoint) -> usize {
+        self.key(point.position, point.geometric_normal)
+    }
+
+    /// What a place has learnt so far.
+    pub fn shares(&self, key: usize) -> &OnceLock<Box<Shares>> {
+        &self.shares[key]
+    }
+
     /// Corner of the cell of a key, and its main direction, unit.
-    fn cell(&self, key: usize) -> (Vec3, Vec3) {
+    pub fn cell(&self, key: usize) -> (Vec3, Vec3) {
         let (index, facing) = ((key / 6) as u32, key % 6);
         let (nx, ny) = (self.cells.x, self.cells.y);
         let cell = UVec3::new(index % nx, index / nx % ny, index / (nx * ny));
         let sign = if facing.is_multiple_of(2) { 1.0 } else { -1.0 };
         (self.low + cell.as_vec3() * self.cell, Vec3::AXES[facing / 2] * sign)
     }
-}
-
-/// Light that a ray found while a place learnt.
-struct Found {
-    group: usize,
-    /// Luminance × cosine.
-    light: f32,
-    /// Densities of the two techniques, that towards emitters within the group, sr⁻¹.
-    in_group: f32,
-    by_cosine: f32,
-}
-
-impl World<'_> {
-    /// What the place of a surface point has learnt.
-    #[inline]
-    pub fn shares_at(&self, point: &SurfacePoint) -> &Shares {
-        let key = self.places.key(point.position, point.geometric_normal);
-        self.places.learnt[key].get_or_init(|| Box::new(self.learn_place(key)))
-    }
-
-    fn learn_place(&self, key: usize) -> Shares {
-        let mut random = Random::new(0, Purpose::Places, key as u64, 0);
-        let points = self.points_of_place(key, &mut random);
-        self.learn(&points, &mut random)
-    }
-
-    /// Points on the surfaces of a place: rays against its main direction find them. Where there are none, points in its
-    /// free space.
-    fn points_of_place(&self, key: usize, random: &mut Random) -> Vec<Receiver> {
-        let (corner, facing) = self.places.cell(key);
-        let margin = self.places.cell * OVERLAP;
-        let (low, high) = (corner - margin, corner + self.places.cell + margin);
-        let mut points = Vec::new();
-        for _ in 0..POINTS * TRIES {
-            let place = Vec3::new(random.uniform(), random.uniform(), random.uniform());
-            let Some(surface) = self.surface(Ray::new(low + (high - low) * place, -facing, random.bits())) else {
-                continue;
-            };
-            let p = surface.position;
-            let within = p.cmpge(low).all() && p.cmple(high).all();
-            if within && self.places.key(p, surface.geometric_normal) % 6 == key % 6 {
-                points.push(surface.receiver(surface.shading_normal));
-            }
-            if points.len() == POINTS {
-                break;
-            }
-        }
-        while points.is_empty() {
-            let place = Vec3::new(random.uniform(), random.uniform(), random.uniform());
-            let position = low + (high - low) * place;
-            points.push(Receiver { position, normal: facing, geometric_normal: facing });
-        }
-        points
-    }
-
-    /// Shares for these points, from rays of their own.
-    pub fn learn(&self, points: &[Receiver], random: &mut Random) -> Shares {
-        let groups = self.emitters.groups();
-        let mean =
-            |g| points.iter().map(|p| f64::from(self.emitters.importance(g, p))).sum::<f64>() / points.len() as f64;
-        let expected: Vec<f64> = (0..groups).map(mean).collect();
-        let mut ranked: Vec<usize> = (0..groups).filter(|&g| expected[g] > 0.0).collect();
-        ranked.sort_by(|&a, &b| expected[b].total_cmp(&expected[a]).then(a.cmp(&b)));
-        ranked.truncate(TESTED);
-        let per_group = (LIGHT_RAYS / ranked.len().max(1)).clamp(RAYS_PER_GROUP[0], RAYS_PER_GROUP[1]);
-        let mut tested = vec![0.0f32; groups];
-        let mut found = Vec::new();
-        for (rank, &group) in ranked.iter().enumerate() {
-            tested[group] = per_group as f32;
-            for i in 0..per_group {
-                found.extend(self.test_group(group, &points[(rank + i) % points.len()], random));
-            }
-        }
-        for i in 0..COSINE_RAYS {
-            found.extend(self.test_cosine(&points[i % points.len()], random));
-        }
-        // Densities of all rays at which each of these was found: the balance heuristic again.
-        let all = |f: &Found| tested[f.group] * f.in_group + COSINE_RAYS as f32 * f.by_cosine;
-        let mut second_moments = vec![0.0f64; groups];
-        for f in &found {
-            second_moments[f.group] += f64::from(f.light * f.light / (f.in_group * all(f)));
-        }
-        // The least variance has draws in proportion to the root of the second moment.
-        let learnt: Vec<f64> = second_moments.iter().map(|m| m.sqrt()).collect();
-        let (learnt_sum, expected_sum) = (learnt.iter().sum::<f64>(), expected.iter().sum::<f64>());
-        let lit = learnt_sum > 0.0 && learnt_sum.is_finite();
-        let defensive = if lit { DEFENSIVE } else { 1.0 };
-        let weight = |g: usize| {
-            let of = |value: f64, sum: f64| if sum > 0.0 && sum.is_finite() { value / sum } else { 0.0 };
-            let even = 1.0 / groups as f64;
-            (1.0 - defensive) * of(learnt[g], learnt_sum) + 0.5 * defensive * (of(expected[g], expected_sum) + even)
-        };
-        let weights: Vec<f64> = (0..groups).map(weight).collect();
-        let mut shares = Shares::new(&weights);
-        shares.lit = lit;
-        shares.cosine = if self.emitters.is_uniform_sky() { 1.0 } else { best_cosine_share(&shares, &found, all) };
-        shares
-    }
-
-    fn test_group(&self, group: usize, receiver: &Receiver, random: &mut Random) -> Option<Found> {
-        let bits = std::array::from_fn(|_| random.bits());
-        let sample = self.emitters.sample_group(self.scene, group, receiver, bits)?;
-        let light = luminance(sample.radiance) * receiver.cosine(sample.direction);
-        let arrives = light > 0.0 && self.reaches(receiver.position, &sample, random.bits());
-        let by_cosine = density_of_test(receiver, sample.direction);
-        arrives.then_some(Found { group, light, in_group: sample.density, by_cosine })
-    }
-
-    fn test_cosine(&self, receiver: &Receiver, random: &mut Random) -> Option<Found> {
-        let u = Vec2::new(random.uniform(), random.uniform());
-        let direction = if receiver.has_normal() { cosine_hemisphere(receiver.normal, u) } else { uniform_sphere(u) };
-        let cosine = receiver.cosine(direction);
-        if cosine <= 0.0 {
-            return None;
-        }
-        let emission = self.emission_along(receiver, Ray::new(receiver.position, direction, random.bits()))?;
-        let light = luminance(emission.radiance) * cosine;
-        let by_cosine = density_of_test(receiver, direction);
-        let found = Found { group: emission.group, light, in_group: emission.density, by_cosine };
-        (found.light > 0.0 && found.in_group > 0.0).then_some(found)
-    }
-}
-
-/// Density of the rays that do not know of emitters, sr⁻¹.
-fn density_of_test(receiver: &Receiver, direction: Vec3) -> f32 {
-    if receiver.has_normal() {
-        cosine_hemisphere_density(receiver.normal.dot(direction))
-    } else {
-        UNIFORM_SPHERE_DENSITY
-    }
-}
-
-/// The share of cosine-distributed samples at which the mixture of both techniques has the least second moment.
-fn best_cosine_share(shares: &Shares, found: &[Found], all: impl Fn(&Found) -> f32) -> f32 {
-    let moment = |share: f32| {
-        let of = |f: &Found| {
-            let mixed = share * f.by_cosine + (1.0 - share) * shares.of(f.group) * f.in_group;
-            f64::from(f.light * f.light / (mixed * all(f)))
-        };
-        found.iter().map(of).sum::<f64>()
-    };
-    COSINE_SHARES.into_iter().min_by(|&a, &b| moment(a).total_cmp(&moment(b))).unwrap_or(0.5)
 }

@@ -3,13 +3,16 @@
 //! What is drawn at random is held to five standard errors: once in two million checks if all is right.
 
 use glam::{DVec3, Mat3, Vec4};
+use proptest::prelude::*;
 
+use super::tree::LightBounds;
 use super::*;
 use crate::light::World;
-use crate::light::sampled::{Allocation, RayCount};
-use crate::light::surface::SurfacePoint;
+use crate::light::sampled::RayCount;
 use crate::math::random::{Purpose, Random};
-use crate::scene::{AlphaMode, Material, MaterialIndex, Mesh, Texels, Texture, TextureIndex, TextureRef, Wrap};
+use crate::scene::environment::EnvironmentMap;
+use crate::scene::{AlphaMode, Environment, Material, MaterialIndex, Mesh, Texels, Texture, TextureIndex, TextureRef};
+use crate::scene::{TriangleIndex, Wrap};
 use crate::trace::Ray;
 
 const DRAWS: u32 = 100_000;
@@ -140,36 +143,98 @@ fn form_factor(lamp: &Lamp, normal: Vec3) -> f64 {
     0.5 * (edge(a, b) + edge(b, c) + edge(c, a)).abs()
 }
 
+/// The same share for every group.
+fn even(emitters: &Emitters) -> Shares {
+    Shares::new(&vec![1.0; emitters.groups()])
+}
+
+const ORIGIN: Receiver = Receiver { position: Vec3::ZERO, normal: Vec3::ZERO, geometric_normal: Vec3::ZERO };
+
+/// A tree over small lights strewn at random, some of which shine to one side, some to both, some all around.
+fn strewn(count: usize) -> (Vec<LightBounds>, LightTree) {
+    let mut random = random(11);
+    let mut number = move |low: f32, high: f32| low + (high - low) * random.uniform();
+    let mut vector = move || Vec3::new(number(-1.0, 1.0), number(-1.0, 1.0), number(-1.0, 1.0));
+    let light = |i: usize| {
+        let (corner, size) = (vector() * 10.0, vector().abs() * 0.1);
+        let normals = match i % 3 {
+            0 => cone::Cone::SPHERE,
+            _ => cone::Cone { axis: vector().normalize(), angle: 0.0 },
+        };
+        LightBounds {
+            low: corner,
+            high: corner + size,
+            power: 1.0 + (i % 7) as f32,
+            normals,
+            cos_reach: 0.0,
+            two_sided: i % 3 == 1,
+            range_m: f32::INFINITY,
+        }
+    };
+    let lights: Vec<LightBounds> = (0..count).map(light).collect();
+    let tree = LightTree::new(&lights);
+    (lights, tree)
+}
+
 #[test]
-fn triangles_are_chosen_by_area_radiance_and_sides() {
-    // Luminance of (0, 1/2, 0) is 0.3576: powers 1/2·1, 2·0.3576·2 sides, 1/2·2.
-    let powers = [0.5, 0.0, 1.4304, 1.0];
-    let total: f64 = powers.iter().sum();
-    for environment in [Environment::None, sky()] {
-        let scene = scene(&[CEILING, DARK, SCREEN, TURNED], environment);
-        let emitters = Emitters::new(&scene);
-        assert_eq!(emitters.triangle_count(), 3);
-        let of_triangles = if emitters.has_sky() { 0.5 } else { 1.0 };
-        let mut random = random(1);
-        let mut chosen = [Mean::default(); 4];
-        let mut sky = Mean::default();
-        for _ in 0..DRAWS {
-            let drawn = match emitters.draw(&scene, bits(&mut random)).expect("there are emitters") {
-                Drawn::Sky { .. } => None,
-                Drawn::Triangle { triangle, .. } => Some(triangle.index.0 as usize),
-            };
-            (0..4).for_each(|t| chosen[t].add(f32::from(drawn == Some(t))));
-            sky.add(f32::from(drawn.is_none()));
+fn the_tree_draws_every_light_as_often_as_it_says() {
+    for count in [1, 2, 5, 300, 1000] {
+        let (_, tree) = strewn(count);
+        let up = Receiver { normal: Vec3::Y, geometric_normal: Vec3::Y, ..ORIGIN };
+        for receiver in [ORIGIN, up] {
+            let stated: Vec<f32> = (0..count).map(|light| tree.probability(light, &receiver)).collect();
+            for group in 0..tree.groups() {
+                let lights = || (0..count).filter(|&light| tree.group_of(light) == group);
+                let sum: f32 = lights().map(|light| stated[light]).sum();
+                let reached = tree.importance(group, &receiver) > 0.0;
+                // All of a group's draws, a few roundings apart; none where one half of it is reached by a hair and its
+                // halves are not.
+                assert!((sum - 1.0).abs() < 1e-5 || (sum < 1.0 && count > 1) || !reached, "{sum} in group {group}");
+                // Even numbers give each light its probability, to within one number's for every turn on its path.
+                let n = 4096;
+                let mut drawn = vec![0; count];
+                for i in 0..n {
+                    if let Some((light, probability)) = tree.draw(group, &receiver, f64::from(i) / f64::from(n)) {
+                        assert!(
+                            (probability / stated[light] - 1.0).abs() < 1e-4,
+                            "{probability} and {}",
+                            stated[light]
+                        );
+                        drawn[light] += 1;
+                    }
+                }
+                for light in lights() {
+                    let expected = stated[light] * n as f32;
+                    assert!((drawn[light] as f32 - expected).abs() <= 2.0 + 1e-4 * n as f32, "{light}: {expected}");
+                }
+            }
         }
-        for (t, power) in powers.into_iter().enumerate() {
-            chosen[t].assert_is(of_triangles * power / total, ROUNDING, &format!("share of triangle {t}"));
-        }
-        sky.assert_is(1.0 - of_triangles, ROUNDING, "share of the sky");
-        // The density per area that is stated: times the areas 1/2, 2, 1/2 the probabilities.
-        for (triangle, area) in emitters.triangles.iter().zip([0.5, 2.0, 0.5]) {
-            let stated = f64::from(triangle.density_per_area) * area;
-            let expected = powers[triangle.index.0 as usize] / total;
-            assert!((stated / expected - 1.0).abs() < ROUNDING, "{stated} instead of {expected}");
+    }
+}
+
+#[test]
+fn groups_are_disjoint_and_bounded() {
+    let (_, tree) = strewn(1000);
+    assert_eq!(tree.groups(), 128);
+    let mut count = vec![0; 128];
+    (0..1000).for_each(|light| count[tree.group_of(light)] += 1);
+    assert!(count.iter().all(|&n| n > 0), "{count:?}");
+    assert_eq!(LightTree::new(&[]).groups(), 0);
+}
+
+proptest! {
+    /// What reaches a point is not ruled out: bounds err on one side only.
+    #[test]
+    fn no_light_that_reaches_a_point_is_ruled_out(x in -9.0f32..9.0, y in -9.0f32..9.0, z in -9.0f32..9.0) {
+        let (lights, tree) = strewn(300);
+        let receiver = Receiver { position: Vec3::new(x, y, z), normal: Vec3::Y, geometric_normal: Vec3::Y };
+        for (i, light) in lights.iter().enumerate() {
+            let to_light = (light.low + light.high) * 0.5 - receiver.position;
+            let at_light = if light.two_sided { 1.0 } else { -light.normals.axis.dot(to_light) };
+            let all_around = light.normals == cone::Cone::SPHERE;
+            if to_light.y > 1e-3 && (all_around || at_light > 1e-3) {
+                prop_assert!(tree.probability(i, &receiver) > 0.0, "light {i} at {to_light}");
+            }
         }
     }
 }
@@ -184,7 +249,7 @@ fn reciprocal_densities_sum_to_solid_angles() {
         let mut random = random(2);
         let [mut ceiling, mut screen, mut turned, mut sky] = [Mean::default(); 4];
         for _ in 0..DRAWS {
-            let sample = emitters.sample(&scene, Vec3::ZERO, bits(&mut random));
+            let sample = emitters.sample(&scene, &even(&emitters), &ORIGIN, bits(&mut random));
             let of =
                 |is: &dyn Fn(&LightSample) -> bool| sample.as_ref().filter(|s| is(s)).map_or(0.0, |s| 1.0 / s.density);
             let radiance = |lamp: Lamp| Vec3::from_array(lamp.radiance);
@@ -207,16 +272,17 @@ fn both_techniques_state_the_same_density() {
         let scene = scene(&[CEILING, SCREEN, TURNED], environment);
         let world = World::new(&scene, 1.0, 0.999).expect("Embree");
         let emitters = &world.emitters;
+        let shares = even(emitters);
         let mut random = random(3);
         for _ in 0..2_000 {
-            let Some(sample) = emitters.sample(&scene, Vec3::ZERO, bits(&mut random)) else { continue };
+            let Some(sample) = emitters.sample(&scene, &shares, &ORIGIN, bits(&mut random)) else { continue };
             let density = match sample.target {
-                None => emitters.density_of_sky(&scene, sample.direction),
+                None => emitters.sky_along(&scene, &shares, sample.direction).1,
                 Some(target) => {
                     let hit = world.tracer.closest(Ray::new(Vec3::ZERO, sample.direction, 0)).expect("the lamp itself");
                     // The shadow segment ends just short of the lamp.
                     assert!(target.length() < hit.t && target.length() > 0.999 * hit.t, "{target} for {}", hit.t);
-                    emitters.density_of_hit(Vec3::ZERO, sample.direction, &hit)
+                    emitters.density_of_hit(&shares, &ORIGIN, sample.direction, &hit)
                 }
             };
             // Found by a ray, the place on the triangle is off by some roundings.
@@ -224,69 +290,72 @@ fn both_techniques_state_the_same_density() {
         }
         // What does not emit is never drawn.
         let dark = Hit { t: 1.0, triangle: TriangleIndex(7), barycentric: Vec2::ZERO };
-        assert_eq!(emitters.density_of_hit(Vec3::ZERO, Vec3::X, &dark), 0.0);
+        assert_eq!(emitters.density_of_hit(&shares, &ORIGIN, Vec3::X, &dark), 0.0);
     }
 }
 
-/// 4 × 2 texels with powers that differ, one black.
+/// 16 × 8 texels with powers that differ, some black: blocks of two by two.
 fn map() -> EnvironmentMap {
-    let grey = [1.0, 0.0, 3.0, 0.5, 2.0, 9.0, 0.25, 1.0];
-    EnvironmentMap { width: 4, height: 2, texels: grey.map(Vec3::splat).to_vec() }
+    let grey = [1.0, 0.0, 3.0, 0.5, 2.0, 9.0, 0.25, 0.0, 1.0, 4.0];
+    let texels = (0..128).map(|i| Vec3::splat(grey[i % 10])).collect();
+    EnvironmentMap { width: 16, height: 8, texels }
 }
 
 #[test]
 fn texels_of_the_sky_are_drawn_by_power() {
-    // A lamp beside it takes half of the draws, and must not change how the other half is spread.
-    for (lamps, share) in [(&[][..], 1.0), (&[TURNED][..], 0.5)] {
+    for lamps in [&[][..], &[TURNED][..]] {
         let scene = scene(lamps, Environment::Map(map()));
         let emitters = Emitters::new(&scene);
-        // Two rows of four: every texel has an eighth of the sphere, π/2. Radiances sum to 16.75.
-        let per_texel = std::f64::consts::PI / 2.0;
+        let shares = even(&emitters);
+        assert_eq!(emitters.groups(), 32 + lamps.len());
+        let edge = |row: usize| (row as f64 / 8.0 * std::f64::consts::PI).cos();
+        let solid_angle = |texel: usize| (edge(texel / 16) - edge(texel / 16 + 1)) * std::f64::consts::TAU / 16.0;
+        let block = |texel: usize| texel / 32 * 8 + texel % 16 / 2;
+        let power = |texel: usize| f64::from(map().texels[texel].x) * solid_angle(texel);
+        let of_block = |b: usize| (0..128).filter(|&t| block(t) == b).map(power).sum::<f64>();
         let mut random = random(4);
-        let (mut shares, mut solid_angles) = ([Mean::default(); 8], [Mean::default(); 8]);
-        let mut height = Mean::default();
+        let (mut drawn, mut solid_angles) = ([Mean::default(); 128], [Mean::default(); 128]);
         for _ in 0..DRAWS {
-            let sample = emitters.sample(&scene, Vec3::ZERO, bits(&mut random));
-            let drawn = sample.map(|sample| {
+            let sample = emitters.sample(&scene, &shares, &ORIGIN, bits(&mut random)).filter(|s| s.target.is_none());
+            let found = sample.map(|sample| {
                 let texel = map().texel_index(sample.direction);
-                assert_eq!((sample.radiance, sample.target), (map().texels[texel], None));
-                assert_eq!(sample.density, emitters.density_of_sky(&scene, sample.direction));
+                assert_eq!(sample.radiance, map().texels[texel]);
+                let (radiance, density) = emitters.sky_along(&scene, &shares, sample.direction);
+                assert_eq!((radiance, density), (sample.radiance, sample.density));
                 (texel, sample)
             });
-            for texel in 0..8 {
-                let here = drawn.filter(|(t, _)| *t == texel);
-                shares[texel].add(f32::from(here.is_some()));
+            for texel in 0..128 {
+                let here = found.filter(|(t, _)| *t == texel);
+                drawn[texel].add(f32::from(here.is_some()));
                 solid_angles[texel].add(here.map_or(0.0, |(_, sample)| 1.0 / sample.density));
             }
-            if let Some((0..4, sample)) = drawn {
-                height.add(sample.direction.y);
-            }
         }
-        for texel in 0..8 {
-            let radiance = f64::from(map().texels[texel].x);
-            shares[texel].assert_is(share * radiance / 16.75, ROUNDING, &format!("share of texel {texel}"));
-            let solid_angle = if radiance > 0.0 { per_texel } else { 0.0 };
-            solid_angles[texel].assert_is(solid_angle, ROUNDING, &format!("solid angle of texel {texel}"));
+        let mut sum = 0.0;
+        for texel in 0..128 {
+            let within = power(texel) / of_block(block(texel));
+            let expected = within / emitters.groups() as f64;
+            drawn[texel].assert_is(expected, ROUNDING, &format!("share of texel {texel}"));
+            let expected = if within > 0.0 { solid_angle(texel) } else { 0.0 };
+            solid_angles[texel].assert_is(expected, ROUNDING, &format!("solid angle of texel {texel}"));
+            let centre = Vec2::new((texel % 16) as f32 + 0.5, 2.0 * ((texel / 16) as f32 + 0.5)) / 16.0;
+            let density = emitters.sky_along(&scene, &shares, EnvironmentMap::direction(centre)).1;
+            sum += f64::from(density) * solid_angle(texel);
         }
-        // Within a texel uniform in solid angle: the mean of y over the upper half sphere is 1/2.
-        height.assert_is(0.5, ROUNDING, "height in the upper row");
         // The densities of all texels integrate to the sky's share.
-        let centre = |t| Vec2::new((t % 4) as f32 + 0.5, 2.0 * ((t / 4) as f32 + 0.5)) / 4.0;
-        let density = |t| f64::from(emitters.density_of_sky(&scene, EnvironmentMap::direction(centre(t))));
-        let sum: f64 = (0..8).map(|t: u32| density(t) * per_texel).sum();
-        assert!((sum - share).abs() < ROUNDING, "{sum}");
+        assert!((sum - 32.0 / emitters.groups() as f64).abs() < ROUNDING, "{sum}");
     }
 }
 
 /// Mean irradiance at the origin from samples towards emitters alone, green channel.
 fn sampled_irradiance(scene: &Scene, normal: Vec3, geometric_normal: Vec3) -> Mean {
     let emitters = Emitters::new(scene);
+    let shares = even(&emitters);
     let receiver = Receiver { position: Vec3::ZERO, normal, geometric_normal };
     let mut random = random(5);
     let mut mean = Mean::default();
     for _ in 0..DRAWS {
-        let sample = emitters.irradiance_sample(scene, &receiver, [0.0, 1.0], bits(&mut random));
-        mean.add(sample.map_or(0.0, |s| s.irradiance.y));
+        let sample = emitters.sample(scene, &shares, &receiver, bits(&mut random));
+        mean.add(sample.map_or(0.0, |s| s.radiance.y * receiver.cosine(s.direction) / s.density));
     }
     mean
 }
@@ -333,7 +402,8 @@ fn any_division_between_the_techniques_gives_the_same_irradiance() {
         let of_sky = environment.radiance(up).y;
         let scene = scene(&[CEILING, SCREEN, TURNED], environment);
         let world = World::new(&scene, 1.0, 0.999).expect("Embree");
-        let point = SurfacePoint::in_space(Vec3::ZERO, up);
+        let receiver = Receiver { normal: up, geometric_normal: up, ..ORIGIN };
+        let shares = even(&world.emitters);
         // Lamps hide the sky behind them, and the one that is turned away does so with its dark back.
         let hidden = ceiling + screen + form_factor(&TURNED, up);
         let expected = ceiling + 0.5 * screen + f64::from(of_sky) * (std::f64::consts::PI - hidden);
@@ -341,10 +411,8 @@ fn any_division_between_the_techniques_gives_the_same_irradiance() {
             let mut random = random(6);
             let mut mean = Mean::default();
             for _ in 0..DRAWS / 4 {
-                let allocation = Allocation { cosine, light };
-                let irradiance =
-                    world.emitter_irradiance(&point, up, allocation, &mut random, &mut RayCount::default());
-                mean.add(irradiance.y);
+                let mut rays = RayCount::default();
+                mean.add(world.irradiance_by(&receiver, &shares, [cosine, light], &mut random, &mut rays).y);
             }
             mean.assert_is(expected, ROUNDING, &format!("{cosine} cosine rays, {light} light samples"));
         }
@@ -382,7 +450,7 @@ fn what_lies_behind_is_known() {
     let mut random = random(7);
     let draw = |from: Vec3, random: &mut Random| {
         (0..1000)
-            .filter_map(|_| emitters.sample(&only_lamps, from, bits(random)))
+            .filter_map(|_| emitters.sample(&only_lamps, &even(&emitters), &Receiver::in_space(from), bits(random)))
             .map(|s| s.radiance.x)
             .collect::<Vec<_>>()
     };
@@ -392,9 +460,56 @@ fn what_lies_behind_is_known() {
     let empty = scene(&[DARK], Environment::None);
     let emitters = Emitters::new(&empty);
     assert!(emitters.is_empty() && emitters.all_behind(Vec3::ZERO, Vec3::Y));
-    assert!(emitters.sample(&empty, Vec3::ZERO, [1; 4]).is_none());
     let open = scene(&[DARK], sky());
     let emitters = Emitters::new(&open);
     assert!(emitters.is_uniform_sky() && !emitters.all_behind(Vec3::ZERO, Vec3::NEG_Y));
     assert!(Emitters::new(&scene(&[DARK], Environment::Constant(Vec3::ZERO))).is_empty(), "a black sky is none");
+}
+
+/// A lamp of 64 × 64 texels of which one is lit is as good as a lamp of that texel's shape.
+#[test]
+fn one_bright_texel_is_a_small_lamp() {
+    for alpha in [false, true] {
+        let mut scene = scene(&[CEILING], Environment::None);
+        let black = if alpha { [255, 255, 255, 0] } else { [0, 0, 0, 255] };
+        let mut data = vec![black; 64 * 64];
+        data[20 * 64 + 10] = [255; 4];
+        let texels = Texels::Rgba8 { data, srgb: false };
+        scene.textures.push(Texture { width: 64, height: 64, wrap: [Wrap::Repeat; 2], nearest: true, texels });
+        let reference = TextureRef { texture: TextureIndex(0), uv_set: 0, texture_from_uv: Mat3::IDENTITY };
+        if alpha {
+            scene.materials[0].base_color_texture = Some(reference);
+            scene.materials[0].alpha_mode = AlphaMode::Mask { cutoff: 0.5 };
+        } else {
+            scene.materials[0].emission_texture = Some(reference);
+        }
+        let [a, b, c] = CEILING.corners.map(Vec3::from_array);
+        let at = |u: f32, v: f32| (a + ((b - a) * u + (c - a) * v) / 64.0).to_array();
+        let halves =
+            [[at(10.0, 20.0), at(11.0, 20.0), at(10.0, 21.0)], [at(11.0, 21.0), at(10.0, 21.0), at(11.0, 20.0)]];
+        let expected: f64 = halves.map(|corners| form_factor(&Lamp { corners, ..CEILING }, Vec3::Y)).iter().sum();
+        let mean = sampled_irradiance(&scene, Vec3::Y, Vec3::Y);
+        mean.assert_is(expected, ROUNDING, "the texel");
+        // Pieces reach a texel beyond it on every side, as interpolation does: 1 of 9 to 25 draws meets it, not 1 of 2048.
+        let variance = mean.squares / mean.count / expected.powi(2);
+        assert!(variance < 50.0, "second moment {variance} × the square of the mean");
+    }
+}
+
+/// What places have learnt leaves no emitter out, and divides the samples as it should.
+#[test]
+fn places_learn_what_they_see() {
+    // Between the origin and the screen there is a wall; the ceiling is seen.
+    let wall = Lamp { corners: [[-1.0, -9.0, -9.0], [-1.0, -9.0, 9.0], [-1.0, 19.0, 0.0]], ..DARK };
+    let scene = scene(&[CEILING, SCREEN, wall], Environment::None);
+    let world = World::new(&scene, 1.0, 0.999).expect("Embree");
+    let receiver = Receiver { normal: Vec3::Y, geometric_normal: Vec3::Y, ..ORIGIN };
+    let shares = world.learn(&[receiver], &mut random(8));
+    let group =
+        |t| world.emitters.pieces.at(TriangleIndex(t), Vec2::splat(0.2)).map(|(p, _)| world.emitters.tree.group_of(p));
+    let (ceiling, screen) = (group(0).expect("it emits"), group(1).expect("it emits"));
+    assert!(shares.lit && shares.of(ceiling) > 0.9, "{}", shares.of(ceiling));
+    // Unseen by a few rays is not unseen: a twentieth of the draws is spread over all, and half of that evenly.
+    assert!(shares.of(screen) >= 0.0125, "{}", shares.of(screen));
+    assert_eq!(group(2), None);
 }

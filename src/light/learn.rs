@@ -1,0 +1,181 @@
+//! What places learn of the light, by rays of their own.
+//!
+//! A place learns which emitters it sees: some points of it send rays towards every group of emitters that may light it,
+//! and cosine-distributed rays. What it learns depends on the scene alone: neither the seed nor the order of threads has an
+//! effect. Every group of emitters keeps a positive share, so estimates stay unbiased.
+
+use glam::{Vec2, Vec3};
+
+use super::World;
+use super::emitters::receiver::Receiver;
+use super::emitters::shares::Shares;
+use super::surface::SurfacePoint;
+use crate::math::color::luminance;
+use crate::math::random::{Purpose, Random};
+use crate::math::sampling::{UNIFORM_SPHERE_DENSITY, cosine_hemisphere, cosine_hemisphere_density, uniform_sphere};
+use crate::trace::Ray;
+
+/// Cells are larger than their volume by this share of their side on every side when they look for points: surfaces that
+/// lie on a border belong to either cell by rounding.
+const OVERLAP: f32 = 0.1;
+
+/// Points that a place learns from, and rays that look for each.
+const POINTS: usize = 8;
+const TRIES: usize = 4;
+
+/// Groups that a place sends rays to: those that may send most light.
+const TESTED: usize = 32;
+
+/// Rays towards emitters in all, as far as [`RAYS_PER_GROUP`] allows, and cosine-distributed rays.
+const LIGHT_RAYS: usize = 64;
+const RAYS_PER_GROUP: [usize; 2] = [2, 8];
+const COSINE_RAYS: usize = 16;
+
+/// Share of draws that does not follow what was learnt: half of it follows what may arrive if nothing occludes it, half
+/// is even over all groups. It bounds the noise where few rays have learnt something wrong.
+const DEFENSIVE: f64 = 0.05;
+
+/// The shares of cosine-distributed samples that are tried.
+const COSINE_SHARES: [f32; 5] = [0.125, 0.25, 0.5, 0.75, 0.875];
+
+/// Light that a ray found while a place learnt.
+struct Found {
+    group: usize,
+    /// Luminance × cosine.
+    light: f32,
+    /// Densities of the two techniques, that towards emitters within the group, sr⁻¹.
+    in_group: f32,
+    by_cosine: f32,
+}
+
+impl World<'_> {
+    /// What the place of a surface point has learnt.
+    #[inline]
+    pub fn shares_at(&self, point: &SurfacePoint) -> &Shares {
+        let key = self.places.key_of(point);
+        self.places.shares(key).get_or_init(|| Box::new(self.learn_place(key)))
+    }
+
+    fn learn_place(&self, key: usize) -> Shares {
+        let mut random = Random::new(0, Purpose::Places, key as u64, 0);
+        let points = self.points_of_place(key, &mut random);
+        self.learn(&points, &mut random)
+    }
+
+    /// Points on the surfaces of a place: rays against its main direction find them. Where there are none, points in its
+    /// free space.
+    fn points_of_place(&self, key: usize, random: &mut Random) -> Vec<Receiver> {
+        let (corner, facing) = self.places.cell(key);
+        let margin = self.places.cell * OVERLAP;
+        let (low, high) = (corner - margin, corner + self.places.cell + margin);
+        let mut points = Vec::new();
+        for _ in 0..POINTS * TRIES {
+            let place = Vec3::new(random.uniform(), random.uniform(), random.uniform());
+            let Some(surface) = self.surface(Ray::new(low + (high - low) * place, -facing, random.bits())) else {
+                continue;
+            };
+            let p = surface.position;
+            let within = p.cmpge(low).all() && p.cmple(high).all();
+            if within && self.places.key(p, surface.geometric_normal) % 6 == key % 6 {
+                points.push(surface.receiver(surface.shading_normal));
+            }
+            if points.len() == POINTS {
+                break;
+            }
+        }
+        while points.is_empty() {
+            let place = Vec3::new(random.uniform(), random.uniform(), random.uniform());
+            let position = low + (high - low) * place;
+            points.push(Receiver { position, normal: facing, geometric_normal: facing });
+        }
+        points
+    }
+
+    /// Shares for these points, from rays of their own.
+    pub fn learn(&self, points: &[Receiver], random: &mut Random) -> Shares {
+        let groups = self.emitters.groups();
+        let mean =
+            |g| points.iter().map(|p| f64::from(self.emitters.importance(g, p))).sum::<f64>() / points.len() as f64;
+        let expected: Vec<f64> = (0..groups).map(mean).collect();
+        let mut ranked: Vec<usize> = (0..groups).filter(|&g| expected[g] > 0.0).collect();
+        ranked.sort_by(|&a, &b| expected[b].total_cmp(&expected[a]).then(a.cmp(&b)));
+        ranked.truncate(TESTED);
+        let per_group = (LIGHT_RAYS / ranked.len().max(1)).clamp(RAYS_PER_GROUP[0], RAYS_PER_GROUP[1]);
+        let mut tested = vec![0.0f32; groups];
+        let mut found = Vec::new();
+        for (rank, &group) in ranked.iter().enumerate() {
+            tested[group] = per_group as f32;
+            for i in 0..per_group {
+                found.extend(self.test_group(group, &points[(rank + i) % points.len()], random));
+            }
+        }
+        for i in 0..COSINE_RAYS {
+            found.extend(self.test_cosine(&points[i % points.len()], random));
+        }
+        // Densities of all rays at which each of these was found: the balance heuristic again.
+        let all = |f: &Found| tested[f.group] * f.in_group + COSINE_RAYS as f32 * f.by_cosine;
+        let mut second_moments = vec![0.0f64; groups];
+        for f in &found {
+            second_moments[f.group] += f64::from(f.light * f.light / (f.in_group * all(f)));
+        }
+        // The least variance has draws in proportion to the root of the second moment.
+        let learnt: Vec<f64> = second_moments.iter().map(|m| m.sqrt()).collect();
+        let (learnt_sum, expected_sum) = (learnt.iter().sum::<f64>(), expected.iter().sum::<f64>());
+        let lit = learnt_sum > 0.0 && learnt_sum.is_finite();
+        let defensive = if lit { DEFENSIVE } else { 1.0 };
+        let weight = |g: usize| {
+            let of = |value: f64, sum: f64| if sum > 0.0 && sum.is_finite() { value / sum } else { 0.0 };
+            let even = 1.0 / groups as f64;
+            (1.0 - defensive) * of(learnt[g], learnt_sum) + 0.5 * defensive * (of(expected[g], expected_sum) + even)
+        };
+        let weights: Vec<f64> = (0..groups).map(weight).collect();
+        let mut shares = Shares::new(&weights);
+        shares.lit = lit;
+        shares.cosine = if self.emitters.is_uniform_sky() { 1.0 } else { best_cosine_share(&shares, &found, all) };
+        shares
+    }
+
+    fn test_group(&self, group: usize, receiver: &Receiver, random: &mut Random) -> Option<Found> {
+        let bits = std::array::from_fn(|_| random.bits());
+        let sample = self.emitters.sample_group(self.scene, group, receiver, bits)?;
+        let light = luminance(sample.radiance) * receiver.cosine(sample.direction);
+        let arrives = light > 0.0 && self.reaches(receiver.position, &sample, random.bits());
+        let by_cosine = density_of_test(receiver, sample.direction);
+        arrives.then_some(Found { group, light, in_group: sample.density, by_cosine })
+    }
+
+    fn test_cosine(&self, receiver: &Receiver, random: &mut Random) -> Option<Found> {
+        let u = Vec2::new(random.uniform(), random.uniform());
+        let direction = if receiver.has_normal() { cosine_hemisphere(receiver.normal, u) } else { uniform_sphere(u) };
+        let cosine = receiver.cosine(direction);
+        if cosine <= 0.0 {
+            return None;
+        }
+        let emission = self.emission_along(receiver, Ray::new(receiver.position, direction, random.bits()))?;
+        let light = luminance(emission.radiance) * cosine;
+        let by_cosine = density_of_test(receiver, direction);
+        let found = Found { group: emission.group, light, in_group: emission.density, by_cosine };
+        (found.light > 0.0 && found.in_group > 0.0).then_some(found)
+    }
+}
+
+/// Density of the rays that do not know of emitters, sr⁻¹.
+fn density_of_test(receiver: &Receiver, direction: Vec3) -> f32 {
+    if receiver.has_normal() {
+        cosine_hemisphere_density(receiver.normal.dot(direction))
+    } else {
+        UNIFORM_SPHERE_DENSITY
+    }
+}
+
+/// The share of cosine-distributed samples at which the mixture of both techniques has the least second moment.
+fn best_cosine_share(shares: &Shares, found: &[Found], all: impl Fn(&Found) -> f32) -> f32 {
+    let moment = |share: f32| {
+        let of = |f: &Found| {
+            let mixed = share * f.by_cosine + (1.0 - share) * shares.of(f.group) * f.in_group;
+            f64::from(f.light * f.light / (mixed * all(f)))
+        };
+        found.iter().map(of).sum::<f64>()
+    };
+    COSINE_SHARES.into_iter().min_by(|&a, &b| moment(a).total_cmp(&moment(b))).unwrap_or(0.5)
+}

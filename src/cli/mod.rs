@@ -10,7 +10,7 @@ use clap::{Args, Parser, Subcommand};
 use crate::scene::EnvironmentSource;
 
 pub use self::values::{LookAt, PictureSize};
-use self::values::{parse_exposure, parse_positive, parse_size};
+use self::values::{parse_exposure, parse_finite, parse_not_negative, parse_positive, parse_size};
 
 /// Bakes light-field probe volumes for global illumination and measures how much they leak, err and cost.
 #[derive(Debug, Parser)]
@@ -71,9 +71,18 @@ pub enum Command {
 /// Flags of every command that loads a scene and traces it.
 #[derive(Debug, Args)]
 pub struct TraceArgs {
-    /// Sky: an equirectangular map or a constant radiance, W·m⁻²·sr⁻¹.
-    #[arg(long, value_name = "FILE.hdr|FILE.exr|R,G,B", value_parser = EnvironmentSource::from_str, allow_hyphen_values = true)]
+    /// Sky: an equirectangular map, its centre −Z and its top +Y, or a constant radiance, W·m⁻²·sr⁻¹.
+    ///
+    /// FILE.exr:LAYER reads a layer or part of an OpenEXR file instead of its plain R, G, B. `EXPOSURE` and `COLORCORR` of
+    /// HDR files are divided out; primaries other than Rec. 709 are converted, white to white (Bradford).
+    #[arg(long, value_name = "FILE.hdr|FILE.exr[:LAYER]|R,G,B", value_parser = EnvironmentSource::from_str, allow_hyphen_values = true)]
     pub env: Option<EnvironmentSource>,
+    /// Turn the map of --env about +Y, counterclockwise as seen from above: 90 takes its centre from −Z to −X.
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, requires = "env", value_parser = parse_finite, allow_hyphen_values = true)]
+    pub env_rotate: f64,
+    /// Multiply the radiance of --env, from 0 up.
+    #[arg(long, value_name = "X", default_value_t = 1.0, requires = "env", value_parser = parse_not_negative, allow_hyphen_values = true)]
+    pub env_scale: f32,
     /// Seed of all random numbers.
     #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     pub seed: u64,

@@ -66,6 +66,16 @@ pub fn parse_positive(text: &str) -> Result<f32, String> {
     number.ok_or_else(|| format!("write a number from {:.1e} to {:.1e}", range.start(), range.end()))
 }
 
+pub fn parse_finite(text: &str) -> Result<f64, String> {
+    let number: Option<f64> = text.parse().ok().filter(|x: &f64| x.is_finite());
+    number.ok_or_else(|| "write a finite number".into())
+}
+
+pub fn parse_not_negative(text: &str) -> Result<f32, String> {
+    let number: Option<f32> = text.parse().ok().filter(|x: &f32| x.is_finite() && *x >= 0.0);
+    number.ok_or_else(|| "write a finite number from 0 up".into())
+}
+
 pub fn parse_size(text: &str) -> Result<u64, String> {
     text.parse::<bytesize::ByteSize>()
         .map(|size| size.as_u64())

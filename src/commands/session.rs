@@ -52,7 +52,13 @@ impl<'c> Session<'c> {
         let started = Instant::now();
         let from_light = light.sky.map(|sky| EnvironmentSource::Constant(sky.into()));
         let environment = trace.env.clone().or(from_light);
-        let options = LoadOptions { environment, collapse_constant_images: !opening.keep_images, ..Default::default() };
+        let options = LoadOptions {
+            environment,
+            environment_rotate_deg: trace.env_rotate,
+            environment_scale: trace.env_scale,
+            collapse_constant_images: !opening.keep_images,
+            ..Default::default()
+        };
         let scene = scene::load(path, &options)?;
         for warning in &scene.warnings {
             console.warn(format!("{}: {warning}", path.display()));
@@ -121,8 +127,8 @@ fn set_threads(threads: usize) -> Result<usize> {
 /// What a command reads, for the checks of its outputs.
 pub fn inputs(scene: &Path, trace: &TraceArgs, others: impl IntoIterator<Item = Named>) -> Vec<Named> {
     let mut inputs = vec![Named::new("the scene", scene)];
-    if let Some(EnvironmentSource::File(map)) = &trace.env {
-        inputs.push(Named::new("the environment map", map));
+    if let Some(EnvironmentSource::Map { file, .. }) = &trace.env {
+        inputs.push(Named::new("the environment map", file));
     }
     inputs.extend(others);
     inputs
@@ -156,9 +162,9 @@ pub fn resolve_config(args: &ConfigArgs, trace: &TraceArgs) -> Result<Config> {
 /// A constant `--env` in place of the configured sky.
 pub fn set_sky(config: &mut Config, trace: &TraceArgs) {
     match &trace.env {
-        Some(EnvironmentSource::Constant(sky)) => config.lights.sky = Some((*sky).into()),
+        Some(EnvironmentSource::Constant(sky)) => config.lights.sky = Some((*sky * trace.env_scale).into()),
         // A map replaces the configured sky; its path has no place in the file.
-        Some(EnvironmentSource::File(_)) => config.lights.sky = None,
+        Some(EnvironmentSource::Map { .. }) => config.lights.sky = None,
         None => {}
     }
 }

@@ -5,16 +5,15 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 
 use glam::Vec3;
-use image::codecs::hdr::HdrDecoder;
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+use image::{DynamicImage, ImageFormat, ImageReader};
 
 use super::error::ImageError;
+use super::exr_file::EXR_MAGIC;
 use super::exr_read::read_exr_header;
+use super::hdr::HdrFile;
 use super::layered::{BEAUTY, LayeredImage};
 use crate::system::input::open_file;
 
-/// First bytes of an OpenEXR file.
-const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 /// First bytes of a Radiance file. Programs differ in the bytes after them.
 const HDR_MAGIC: [u8; 2] = *b"#?";
 
@@ -56,10 +55,7 @@ impl ImageHeader {
                 let (width, height, layers) = read_exr_header(path)?;
                 Ok(ImageHeader { width, height, layers, is_display: false })
             }
-            Format::Hdr => {
-                let decoder = HdrDecoder::new(open(path)?).map_err(|e| damaged(path, "Radiance HDR", &e))?;
-                Ok(plain(decoder.dimensions(), false))
-            }
+            Format::Hdr => Ok(plain(HdrFile::open(path, open(path)?)?.size(), false)),
             Format::Png => {
                 let reader = ImageReader::with_format(open(path)?, ImageFormat::Png);
                 Ok(plain(reader.into_dimensions().map_err(|e| damaged(path, "PNG", &e))?, true))
@@ -77,11 +73,10 @@ impl AnyImage {
         match format_of(path)? {
             Format::Exr => Ok(AnyImage { image: LayeredImage::read_exr_layers(path, is_wanted)?, is_display: false }),
             Format::Hdr => {
-                let decoded = HdrDecoder::new(open(path)?).and_then(DynamicImage::from_decoder);
-                Ok(AnyImage {
-                    image: layered(decoded.map_err(|e| damaged(path, "Radiance HDR", &e))?),
-                    is_display: false,
-                })
+                let picture = HdrFile::open(path, open(path)?)?.read()?;
+                let mut image = LayeredImage::new(picture.width, picture.height);
+                image.push(BEAUTY, picture.pixels);
+                Ok(AnyImage { image, is_display: false })
             }
             Format::Png => {
                 let decoded = ImageReader::with_format(open(path)?, ImageFormat::Png).decode();

@@ -21,8 +21,18 @@ pub enum ImageError {
          the file is damaged: export or copy it again"
     )]
     ImplausibleSize { path: PathBuf, width: usize, height: usize, file_bytes: u64 },
-    #[error("cannot read {path}: it has no channels R, G and B, only {channels}; export it with colour")]
+    #[error("cannot read {path}: it has no channels R, G and B and no grey Y, only {channels}; export it with colour")]
     NoColor { path: PathBuf, channels: String },
+    #[error("cannot read {path}: {fault}; name one of its layers as {path}:LAYER: {layers}", path = path.display())]
+    NoLayer { path: PathBuf, fault: String, layers: String },
+    /// The header says that the numbers are not light in R, G and B, or not laid out as a picture.
+    #[error("cannot read {path}: {reason}; {remedy}")]
+    NotLight { path: PathBuf, reason: String, remedy: &'static str },
+    #[error(
+        "cannot read {path}: it has {width}×{height} pixels, more than the {most_pixels} that are read from a file of \
+         {file_bytes} bytes; reduce the picture"
+    )]
+    TooLarge { path: PathBuf, width: usize, height: usize, most_pixels: u64, file_bytes: u64 },
     #[error(
         "cannot write {path}: the layer name {name:?} is not 1 to 200 ASCII letters, digits or underscores; rename it"
     )]

@@ -5,7 +5,7 @@
 //! end a thread instead of returning an error.
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
 use exr::block::UncompressedBlock;
@@ -17,9 +17,13 @@ use exr::prelude::Compression;
 use rayon::prelude::*;
 
 use super::error::ImageError;
+use super::exr_window::Window;
 use crate::system::input::open_file;
 
 const FORMAT: &str = "OpenEXR";
+
+/// First bytes of a file.
+pub(super) const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
 /// Largest expansion of a compressed byte. Deflate reaches 1032 (RFC 1951: 258 bytes in 2 bits); it is doubled for
 /// headroom. The Huffman runs of PIZ (512 bytes in 10 bits) and the other compressions stay below.
@@ -47,22 +51,29 @@ const DWA_COUNTERS: usize = 11;
 const DWA_BLOCK: usize = 8;
 
 /// A file whose headers have been read and checked against the file's size.
-pub(super) struct ExrFile<'a> {
+pub(super) struct ExrFile<'a, R> {
     path: &'a Path,
-    reader: Reader<BufReader<File>>,
+    reader: Reader<R>,
 }
 
-impl<'a> ExrFile<'a> {
-    /// Opens the file. Refuses headers that claim more than a file of this size can hold.
-    pub(super) fn open(path: &'a Path) -> Result<ExrFile<'a>, ImageError> {
+impl<'a> ExrFile<'a, BufReader<File>> {
+    /// Opens a file of the disk. See [`ExrFile::new`].
+    pub(super) fn open(path: &'a Path) -> Result<Self, ImageError> {
         let open_error = |cause| ImageError::Open { path: path.to_owned(), cause };
         let file = open_file(path).map_err(open_error)?;
         let file_bytes = file.metadata().map_err(open_error)?.len();
+        ExrFile::new(path, BufReader::new(file), file_bytes)
+    }
+}
+
+impl<'a, R: Read + Seek> ExrFile<'a, R> {
+    /// Reads the headers of a file of `file_bytes`. Refuses those that claim more than a file of this size can hold.
+    pub(super) fn new(path: &'a Path, content: R, file_bytes: u64) -> Result<Self, ImageError> {
         // `false` accepts headers that break minor rules, because files in use do. Data is still read strictly.
-        let reader = exr::block::read(BufReader::new(file), false).map_err(|error| exr_error(path, error))?;
+        let reader = exr::block::read(content, false).map_err(|error| exr_error(path, error))?;
         for header in reader.headers() {
             if !is_plausible(header, file_bytes) {
-                let (width, height) = (header.layer_size.width(), header.layer_size.height());
+                let (width, height) = largest(header);
                 return Err(ImageError::ImplausibleSize { path: path.to_owned(), width, height, file_bytes });
             }
         }
@@ -111,12 +122,20 @@ impl<'a> ExrFile<'a> {
 }
 
 fn is_plausible(header: &Header, file_bytes: u64) -> bool {
-    let pixels = (header.layer_size.width() as u64).saturating_mul(header.layer_size.height() as u64);
+    let (width, height) = largest(header);
+    let pixels = (width as u64).saturating_mul(height as u64);
     let bytes = pixels.saturating_mul(header.channels.bytes_per_pixel as u64);
     let expansion = if is_dwa(header) { MAX_EXPANSION_DWA } else { MAX_EXPANSION };
     pixels <= MAX_PIXELS
         && bytes <= file_bytes.saturating_mul(expansion).max(HARMLESS_BYTES)
         && (header.chunk_count as u64).saturating_mul(MIN_BLOCK_BYTES) <= file_bytes
+}
+
+/// Width and height of the larger of the pixels that are stored and the picture that they are put into.
+fn largest(header: &Header) -> (usize, usize) {
+    let [stored, shown] = [header.layer_size, Window::of(header).size].map(|size| (size.width(), size.height()));
+    let area = |(width, height): (usize, usize)| width.saturating_mul(height);
+    if area(stored) >= area(shown) { stored } else { shown }
 }
 
 fn is_dwa(header: &Header) -> bool {

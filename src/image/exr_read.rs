@@ -1,21 +1,23 @@
 //! Reading OpenEXR: the plain R, G, B of any flat file, and all layers of files that `exr_write` wrote.
+//!
+//! Pictures fill the display window. Plain R, G, B and `beauty` are converted to Rec. 709; other layers may hold what is no
+//! colour, and stay as they are.
 
 use std::collections::BTreeMap;
+use std::io::{Read as ReadBytes, Seek};
 use std::path::Path;
 
-use exr::block::lines::LineRef;
 use exr::meta::attribute::{AttributeValue, ChannelDescription, SampleType, Text};
 use exr::meta::header::Header;
-use glam::Vec3;
+use glam::{DMat3, Vec3};
 use half::f16;
 
 use super::error::ImageError;
 use super::exr_file::ExrFile;
+use super::exr_layers::{PLAIN, layers_of, no_color, rec_709_from_rgb};
+use super::exr_window::Window;
 use super::layered::{BEAUTY, LayeredImage, STATE, TEXTS};
 use super::picture::Picture;
-
-/// Name of the plain channels R, G, B as a layer, while a file is being read.
-const PLAIN: &str = "";
 
 /// One layer while it is being read.
 struct Layer {
@@ -36,10 +38,7 @@ impl Picture {
         let Some((part, channels)) = file.headers().iter().enumerate().find_map(plain_in) else {
             return Err(no_color(path, file.headers()));
         };
-        let size = file.headers()[part].layer_size;
-        let (layers, _) = read_layers(file, part, BTreeMap::from([(PLAIN.to_owned(), channels)]), BTreeMap::new())?;
-        let pixels = layers.into_iter().flat_map(|layer| layer.pixels).collect();
-        Ok(Picture::from_pixels(size.width() as u32, size.height() as u32, pixels))
+        read_part_layer(path, file, part, channels)
     }
 }
 
@@ -63,13 +62,18 @@ impl LayeredImage {
         let file = ExrFile::open(path)?;
         let (part, mut wanted) = colored_part(path, &file)?;
         wanted.retain(|name, _| is_wanted(if name == PLAIN { BEAUTY } else { name }));
-        let size = file.headers()[part].layer_size;
+        let size = Window::of(&file.headers()[part]).size;
+        let to_rec_709 = rec_709_from_rgb(path, &file.headers()[part])?;
         let mut image = LayeredImage::new(size.width() as u32, size.height() as u32);
         image.texts = texts_of(&file.headers()[part]);
         let words = words_of(&file.headers()[part]);
         let (layers, words) = read_layers(file, part, wanted, words)?;
-        for layer in layers {
-            image.push(if layer.name == PLAIN { BEAUTY } else { &layer.name }, layer.pixels);
+        for mut layer in layers {
+            let name = if layer.name == PLAIN { BEAUTY } else { &layer.name };
+            if name == BEAUTY {
+                convert(&mut layer.pixels, to_rec_709);
+            }
+            image.push(name, layer.pixels);
         }
         for (name, words) in words {
             image.push_words(&name, words);
@@ -85,13 +89,38 @@ impl LayeredImage {
 pub fn read_exr_header(path: &Path) -> Result<(u32, u32, Vec<String>), ImageError> {
     let file = ExrFile::open(path)?;
     let (part, layers) = colored_part(path, &file)?;
-    let size = file.headers()[part].layer_size;
+    let size = Window::of(&file.headers()[part]).size;
     let named = |name: String| if name == PLAIN { BEAUTY.to_owned() } else { name };
     Ok((size.width() as u32, size.height() as u32, layers.into_keys().map(named).collect()))
 }
 
+/// One layer of a part as a picture in Rec. 709.
+pub(super) fn read_part_layer<R: ReadBytes + Seek>(
+    path: &Path,
+    file: ExrFile<'_, R>,
+    part: usize,
+    channels: [usize; 3],
+) -> Result<Picture, ImageError> {
+    let size = Window::of(&file.headers()[part]).size;
+    let to_rec_709 = rec_709_from_rgb(path, &file.headers()[part])?;
+    let (layers, _) = read_layers(file, part, BTreeMap::from([(PLAIN.to_owned(), channels)]), BTreeMap::new())?;
+    let mut pixels: Vec<Vec3> = layers.into_iter().flat_map(|layer| layer.pixels).collect();
+    convert(&mut pixels, to_rec_709);
+    Ok(Picture::from_pixels(size.width() as u32, size.height() as u32, pixels))
+}
+
+/// Multiplies by a matrix, except by the identity, which keeps the bits.
+fn convert(pixels: &mut [Vec3], matrix: DMat3) {
+    if matrix != DMat3::IDENTITY {
+        pixels.iter_mut().for_each(|pixel| *pixel = (matrix * pixel.as_dvec3()).as_vec3());
+    }
+}
+
 /// Index of the first part that has colour, and its layers as [`layers_of`] gives them.
-fn colored_part(path: &Path, file: &ExrFile<'_>) -> Result<(usize, BTreeMap<String, [usize; 3]>), ImageError> {
+fn colored_part<R: ReadBytes + Seek>(
+    path: &Path,
+    file: &ExrFile<'_, R>,
+) -> Result<(usize, BTreeMap<String, [usize; 3]>), ImageError> {
     let colored = |(part, header)| Some((part, layers_of(header))).filter(|(_, layers)| !layers.is_empty());
     let Some((part, mut layers)) = file.headers().iter().enumerate().find_map(colored) else {
         return Err(no_color(path, file.headers()));
@@ -101,20 +130,6 @@ fn colored_part(path: &Path, file: &ExrFile<'_>) -> Result<(usize, BTreeMap<Stri
         layers.remove(PLAIN);
     }
     Ok((part, layers))
-}
-
-/// The layers of a part that have all three channels: from the name to the indices of R, G and B in the file.
-fn layers_of(header: &Header) -> BTreeMap<String, [usize; 3]> {
-    let mut found: BTreeMap<String, [Option<usize>; 3]> = BTreeMap::new();
-    for (place, channel) in header.channels.list.iter().enumerate() {
-        let name = channel.name.to_string();
-        let (layer, letter) = name.rsplit_once('.').unwrap_or((PLAIN, &name));
-        if let Some(component) = ["R", "G", "B"].iter().position(|&l| l == letter) {
-            found.entry(layer.to_owned()).or_default()[component] = Some(place);
-        }
-    }
-    let whole = |(name, [r, g, b]): (String, [Option<usize>; 3])| Some((name, [r?, g?, b?]));
-    found.into_iter().filter_map(whole).collect()
 }
 
 /// The part's channels of words: from the name to the index in the file.
@@ -137,17 +152,18 @@ fn texts_of(header: &Header) -> BTreeMap<String, String> {
 /// Layers and words by name.
 type Read = (Vec<Layer>, BTreeMap<String, Vec<u32>>);
 
-fn read_layers(
-    file: ExrFile<'_>,
+fn read_layers<R: ReadBytes + Seek>(
+    file: ExrFile<'_, R>,
     part: usize,
     wanted: BTreeMap<String, [usize; 3]>,
     wanted_words: BTreeMap<String, usize>,
 ) -> Result<Read, ImageError> {
     let header = &file.headers()[part];
-    let (size, channels) = (header.layer_size, header.channels.clone());
-    let blank = |(name, channels)| Layer { name, channels, pixels: vec![Vec3::ZERO; size.area()] };
+    let (window, channels) = (Window::of(header), header.channels.clone());
+    let area = window.size.area();
+    let blank = |(name, channels)| Layer { name, channels, pixels: vec![Vec3::ZERO; area] };
     let mut layers: Vec<Layer> = wanted.into_iter().map(blank).collect();
-    let mut words: Vec<Vec<u32>> = wanted_words.values().map(|_| vec![0; size.area()]).collect();
+    let mut words: Vec<Vec<u32>> = wanted_words.values().map(|_| vec![0; area]).collect();
     // The destination of each channel of the file.
     let mut targets = vec![None; channels.list.len()];
     for (index, layer) in layers.iter().enumerate() {
@@ -161,21 +177,26 @@ fn read_layers(
     file.for_each_block(part, |block| {
         for line in block.lines(&channels) {
             let place = line.location;
-            let start = place.position.y() * size.width() + place.position.x();
-            let row = start..start + place.sample_count;
+            let (x, y) = (place.position.x(), place.position.y());
+            let Some((row, cut)) = window.place(x, y, place.sample_count) else { continue };
             match targets[place.channel] {
                 None => {}
                 Some(Target::Layer { index, component }) => {
                     let sample_type = channels.list[place.channel].sample_type;
-                    read_line(&line, sample_type, &mut layers[index].pixels[row], component);
+                    let samples = &line.value[cut * sample_type.bytes_per_sample()..];
+                    read_line(samples, sample_type, &mut layers[index].pixels[row], component);
                 }
                 Some(Target::Words { index }) => {
-                    let samples = line.value.as_chunks::<4>().0;
+                    let samples = &line.value.as_chunks::<4>().0[cut..];
                     words[index][row].iter_mut().zip(samples).for_each(|(word, &s)| *word = u32::from_ne_bytes(s));
                 }
             }
         }
     })?;
+    for layer in layers.iter_mut().filter(|layer| layer.channels == [layer.channels[0]; 3]) {
+        // The one channel of a grey layer went into the component that named it last.
+        layer.pixels.iter_mut().for_each(|pixel| *pixel = Vec3::splat(pixel.z));
+    }
     Ok((layers, wanted_words.into_keys().zip(words).collect()))
 }
 
@@ -186,22 +207,17 @@ enum Target {
     Words { index: usize },
 }
 
-/// Copies one channel of a line into a row of pixels. The decoder guarantees that decompressed lines have the machine's
-/// byte order and the length of the row.
-fn read_line(line: &LineRef<'_>, sample_type: SampleType, row: &mut [Vec3], component: usize) {
+/// Copies one channel of a line into a row of pixels, which may be shorter. The decoder guarantees that decompressed lines
+/// have the machine's byte order and their full length.
+fn read_line(samples: &[u8], sample_type: SampleType, row: &mut [Vec3], component: usize) {
     fn fill<const N: usize>(bytes: &[u8], row: &mut [Vec3], component: usize, value: impl Fn([u8; N]) -> f32) {
         for (pixel, &sample) in row.iter_mut().zip(bytes.as_chunks::<N>().0) {
             pixel[component] = value(sample);
         }
     }
     match sample_type {
-        SampleType::F16 => fill(line.value, row, component, |bytes| f16::from_ne_bytes(bytes).to_f32()),
-        SampleType::F32 => fill(line.value, row, component, f32::from_ne_bytes),
-        SampleType::U32 => fill(line.value, row, component, |bytes| u32::from_ne_bytes(bytes) as f32),
+        SampleType::F16 => fill(samples, row, component, |bytes| f16::from_ne_bytes(bytes).to_f32()),
+        SampleType::F32 => fill(samples, row, component, f32::from_ne_bytes),
+        SampleType::U32 => fill(samples, row, component, |bytes| u32::from_ne_bytes(bytes) as f32),
     }
-}
-
-fn no_color(path: &Path, headers: &[Header]) -> ImageError {
-    let channels = headers.iter().flat_map(|header| &header.channels.list).map(|channel| channel.name.to_string());
-    ImageError::NoColor { path: path.to_owned(), channels: channels.collect::<Vec<_>>().join(", ") }
 }

@@ -3,10 +3,14 @@
 mod any;
 mod error;
 mod exr_file;
+mod exr_layers;
 mod exr_read;
+mod exr_window;
 mod exr_write;
+mod hdr;
 mod jpeg;
 mod layered;
+mod light_map;
 mod picture;
 mod png;
 mod tonemap;

@@ -5,6 +5,7 @@ pub mod blocks;
 pub mod color;
 pub mod fibonacci;
 pub mod octahedral;
+pub mod primaries;
 pub mod random;
 pub mod sampling;
 pub mod statistics;

@@ -37,6 +37,26 @@ impl EnvironmentMap {
         Vec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi)
     }
 
+    /// The map turned about +Y by an angle in degrees, counterclockwise as seen from above (right-hand rule): after 90° its
+    /// centre is the direction −X.
+    ///
+    /// Texels stay what they are where the angle is a multiple of `360 / width`. Otherwise each texel takes from the two
+    /// that it overlaps in proportion, which keeps the sum of every row.
+    pub fn turned(self, degrees: f64) -> EnvironmentMap {
+        // Turning by φ about +Y lowers the longitude `2π (u − ½)` of every direction by φ.
+        let shift = (degrees.rem_euclid(360.0) / 360.0) * self.width as f64;
+        let (whole, part) = (shift.floor() as usize, shift.fract() as f32);
+        if shift == 0.0 {
+            return self;
+        }
+        let turned_row = |row: &[Vec3]| -> Vec<Vec3> {
+            let old = |x: usize| row[x % row.len()];
+            (0..row.len()).map(|x| old(x + whole) * (1.0 - part) + old(x + whole + 1) * part).collect()
+        };
+        let texels = self.texels.chunks_exact(self.width).flat_map(turned_row).collect();
+        EnvironmentMap { texels, ..self }
+    }
+
     /// Radiance along a unit direction: that of the texel which contains it. There is no interpolation, so the
     /// densities for sampling by texel are exact.
     pub fn radiance(&self, direction: Vec3) -> Vec3 {
@@ -100,5 +120,49 @@ mod tests {
         assert_eq!(map.radiance(Vec3::new(1.0, 0.1, -0.1).normalize()).x, 2.0);
         // The lower pole belongs to the last row.
         assert!((4..8).contains(&map.texel_index(Vec3::NEG_Y)));
+    }
+
+    #[test]
+    fn maps_turn_counterclockwise_from_above() {
+        let (width, height) = (16, 8);
+        let bright = EnvironmentMap { width, height, texels: vec![Vec3::ZERO; width * height] };
+        let with_bright = |direction: Vec3| {
+            let mut map = bright.clone();
+            let index = map.texel_index(direction);
+            map.texels[index] = Vec3::ONE;
+            map
+        };
+        // Off the borders between texels.
+        let off = Vec3::new(0.05, 0.1, 0.05);
+        for (degrees, from, to) in [
+            (90.0, Vec3::NEG_Z, Vec3::NEG_X),
+            (90.0, Vec3::X, Vec3::NEG_Z),
+            (-90.0, Vec3::NEG_Z, Vec3::X),
+            (180.0, Vec3::NEG_Z, Vec3::Z),
+            (450.0, Vec3::Z, Vec3::X),
+            (0.0, Vec3::X, Vec3::X),
+        ] {
+            let rotation = glam::Quat::from_rotation_y((degrees as f32).to_radians());
+            let start = (from + off).normalize();
+            let turned = with_bright(start).turned(degrees);
+            let found = turned.texels.iter().position(|&texel| texel == Vec3::ONE);
+            assert_eq!(found, Some(turned.texel_index(rotation * start)), "{from} by {degrees}°");
+            // The documentation's own directions.
+            assert!((rotation * from).abs_diff_eq(to, 1e-6), "{from} by {degrees}°");
+        }
+    }
+
+    #[test]
+    fn turns_between_texels_keep_the_light() {
+        let texels: Vec<Vec3> = (0..8).map(|i| Vec3::splat((i * i) as f32)).collect();
+        let map = EnvironmentMap { width: 4, height: 2, texels };
+        // A quarter of a texel.
+        let turned = map.clone().turned(360.0 / 4.0 * 0.25);
+        assert_eq!(turned.texels[0], map.texels[0] * 0.75 + map.texels[1] * 0.25);
+        assert_eq!(turned.texels[7], map.texels[7] * 0.75 + map.texels[4] * 0.25);
+        for row in 0..2 {
+            let sum = |map: &EnvironmentMap| map.texels[4 * row..4 * row + 4].iter().sum::<Vec3>();
+            assert_eq!(sum(&turned), sum(&map));
+        }
     }
 }

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::image::ImageError;
+
 /// The reason why a scene was not loaded. Each message is one line.
 #[derive(Debug, Error)]
 pub enum SceneError {
@@ -20,7 +22,10 @@ pub enum SceneError {
     /// Something in the file breaks the rules of glTF.
     #[error("{file}: {place}: {what}; {remedy}")]
     Invalid { file: PathBuf, place: String, what: String, remedy: &'static str },
-    /// A texture image or environment map cannot be decoded.
+    /// An environment map cannot be decoded.
+    #[error("environment map: {0}")]
+    EnvironmentMap(#[from] ImageError),
+    /// A texture image cannot be decoded, or the sky has no finite radiance.
     #[error("{file}: {place}: {what}; {remedy}")]
     Image { file: PathBuf, place: String, what: String, remedy: &'static str },
     /// The file asks for far more memory than its own size warrants.

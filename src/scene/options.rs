@@ -11,6 +11,11 @@ use thiserror::Error;
 pub struct LoadOptions {
     /// The sky. glTF files contain none.
     pub environment: Option<EnvironmentSource>,
+    /// Turn of an environment map about +Y, degrees, finite. See
+    /// [`EnvironmentMap::turned`](super::environment::EnvironmentMap::turned).
+    pub environment_rotate_deg: f64,
+    /// Factor on the radiance of the sky, finite and not negative.
+    pub environment_scale: f32,
     /// Index of the glTF scene to load. `None` loads the file's default scene.
     pub scene: Option<usize>,
     /// Store an image whose texels are all equal as one texel. Lookups return the same values.
@@ -19,23 +24,36 @@ pub struct LoadOptions {
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        LoadOptions { environment: None, scene: None, collapse_constant_images: true }
+        LoadOptions {
+            environment: None,
+            environment_rotate_deg: 0.0,
+            environment_scale: 1.0,
+            scene: None,
+            collapse_constant_images: true,
+        }
     }
 }
 
-/// The source of the sky. On the command line it is written `FILE.hdr`, `FILE.exr` or `R,G,B`.
+/// The source of the sky. On the command line it is written `FILE.hdr`, `FILE.exr`, `FILE.exr:LAYER` or `R,G,B`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum EnvironmentSource {
     /// One radiance for all directions, W·m⁻²·sr⁻¹. Finite and not negative.
     Constant(Vec3),
     /// An equirectangular map whose centre looks along −Z.
-    File(PathBuf),
+    Map {
+        file: PathBuf,
+        /// A layer or part of an OpenEXR file; `None` for the plain channels.
+        layer: Option<String>,
+    },
 }
 
 /// The reason why a text does not name an [`EnvironmentSource`].
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum EnvironmentSourceError {
-    #[error("environment '{0}' is neither a .hdr or .exr file nor three numbers; write FILE.hdr, FILE.exr or R,G,B")]
+    #[error(
+        "environment '{0}' is neither a .hdr or .exr file nor three numbers; write FILE.hdr, FILE.exr, FILE.exr:LAYER or \
+         R,G,B"
+    )]
     Form(String),
     #[error("environment '{text}': '{part}' is not a number; write R,G,B such as 1,1,1")]
     Number { text: String, part: String },
@@ -49,7 +67,14 @@ impl FromStr for EnvironmentSource {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let lower = text.to_ascii_lowercase();
         if lower.ends_with(".hdr") || lower.ends_with(".exr") {
-            return Ok(EnvironmentSource::File(PathBuf::from(text)));
+            return Ok(EnvironmentSource::Map { file: PathBuf::from(text), layer: None });
+        }
+        // Lower case of ASCII keeps the places of bytes.
+        if let Some(at) = lower.rfind(".exr:").map(|dot| dot + ".exr".len())
+            && at + 1 < text.len()
+        {
+            let layer = Some(text[at + 1..].to_owned());
+            return Ok(EnvironmentSource::Map { file: PathBuf::from(&text[..at]), layer });
         }
         let parts: Vec<&str> = text.split(',').map(str::trim).collect();
         if parts.len() != 3 {
@@ -73,15 +98,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn reads_the_three_forms() {
-        assert_eq!("a b/SKY.HDR".parse(), Ok(EnvironmentSource::File("a b/SKY.HDR".into())));
-        assert_eq!("1,2,3.exr".parse(), Ok(EnvironmentSource::File("1,2,3.exr".into())));
+    fn reads_the_forms() {
+        let map = |file: &str, layer: Option<&str>| {
+            Ok(EnvironmentSource::Map { file: file.into(), layer: layer.map(str::to_owned) })
+        };
+        assert_eq!("a b/SKY.HDR".parse(), map("a b/SKY.HDR", None));
+        assert_eq!("1,2,3.exr".parse(), map("1,2,3.exr", None));
+        assert_eq!("sky.EXR:left.beauty".parse(), map("sky.EXR", Some("left.beauty")));
+        assert_eq!("C:\\sky.exr".parse(), map("C:\\sky.exr", None));
         assert_eq!("1, 0.5,2e-3".parse(), Ok(EnvironmentSource::Constant(Vec3::new(1.0, 0.5, 2e-3))));
     }
 
     #[test]
     fn refuses_the_rest() {
-        for text in ["", "sky.png", "1,2", "1,2,3,4", "1,x,3", "1,-1,0", "nan,0,0", "inf,0,0"] {
+        for text in ["", "sky.png", "1,2", "1,2,3,4", "1,x,3", "1,-1,0", "nan,0,0", "inf,0,0", "sky.exr:", "sky.hdr:a"]
+        {
             assert!(text.parse::<EnvironmentSource>().is_err(), "{text}");
         }
     }

@@ -8,6 +8,7 @@ mod distance;
 mod geometry;
 mod materials;
 mod promises;
+mod skies;
 
 use common::{Folder, Gltf};
 use glam::Vec3;

@@ -146,6 +146,10 @@ fn lights_and_cameras() {
     assert_eq!(scene.cameras[2].projection, lightprobe::scene::camera::Projection::Orthographic { half_height_m: 3.0 });
 }
 
+fn map_of(file: std::path::PathBuf) -> EnvironmentSource {
+    EnvironmentSource::Map { file, layer: None }
+}
+
 #[test]
 fn environments() {
     let folder = Folder::new();
@@ -161,7 +165,7 @@ fn environments() {
     let texel = |x: usize, y: usize| if (x, y) == (3, 1) { (f32::NAN, 1.0, -1.0) } else { (x as f32, y as f32, 0.5) };
     let exr = folder.path().join("sky.exr");
     exr::prelude::write_rgb_file(&exr, 4, 2, texel).expect("an EXR file");
-    let loaded = with(EnvironmentSource::File(exr.clone())).expect("a map");
+    let loaded = with(map_of(exr.clone())).expect("a map");
     let Environment::Map(map) = &loaded.environment else { panic!("not a map") };
     assert_eq!((map.width, map.height), (4, 2));
     assert_eq!(
@@ -174,7 +178,7 @@ fn environments() {
     let pixels: Vec<_> = (0..8).map(|i| image::Rgb([i as f32, 0.5, 2.0])).collect();
     let file = std::fs::File::create(&hdr).expect("a file");
     image::codecs::hdr::HdrEncoder::new(file).encode(&pixels, 4, 2).expect("an HDR file");
-    let loaded = with(EnvironmentSource::File(hdr.clone())).expect("a map");
+    let loaded = with(map_of(hdr.clone())).expect("a map");
     let Environment::Map(map) = &loaded.environment else { panic!("not a map") };
     assert!(map.texels[5].abs_diff_eq(Vec3::new(5.0, 0.5, 2.0), 0.05));
 
@@ -184,11 +188,11 @@ fn environments() {
         let bytes = std::fs::read(&original).expect("a file");
         for _ in 0..150 {
             let damaged = folder.write("damaged.bin", damage(&bytes, &mut rng));
-            if let Err(e) = with(EnvironmentSource::File(damaged)) {
+            if let Err(e) = with(map_of(damaged)) {
                 assert!(!e.to_string().contains('\n'), "{e}");
             }
         }
     }
-    assert!(with(EnvironmentSource::File(folder.path().join("none.exr"))).is_err());
-    assert!(with(EnvironmentSource::File(folder.path().to_owned())).is_err());
+    assert!(with(map_of(folder.path().join("none.exr"))).is_err());
+    assert!(with(map_of(folder.path().to_owned())).is_err());
 }

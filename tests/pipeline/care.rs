@@ -213,7 +213,7 @@ fn skies_that_are_too_large() {
     let sky = folder.write("sky.hdr", header);
     let output = folder.path().join("out.probes");
     let message = refuse(&["bake", text(&scene("furnace")), "-o", text(&output), "--env", text(&sky)]);
-    assert!(message.contains("32768×16384 pixels") && message.contains("reduce the map"), "{message}");
+    assert!(message.contains("32768×16384 pixels") && message.contains("reduce the picture"), "{message}");
 }
 
 #[test]

@@ -131,7 +131,9 @@ fn check_scene(args: &RenderArgs, probes: &ProbeFile, scene: &Scene, console: &C
         args.scene.display()
     );
     if !args.allow_scene_change {
-        bail!("{what}; bake it again, give the --env of the bake, or pass --allow-scene-change");
+        bail!(
+            "{what}; bake it again, give the --env, --env-rotate and --env-scale of the bake, or pass --allow-scene-change"
+        );
     }
     console.warn(what);
     Ok(true)

@@ -1,17 +1,14 @@
 //! Equirectangular environment maps from Radiance HDR and OpenEXR files.
 
-use std::io::Cursor;
 use std::path::Path;
 
 use glam::Vec3;
-use image::codecs::hdr::HdrDecoder;
-use image::{DynamicImage, ImageDecoder};
 
 use super::inputs::Inputs;
-use super::text::sentence;
+use crate::image::Picture;
 use crate::scene::environment::{Environment, EnvironmentMap};
 use crate::scene::error::SceneError;
-use crate::scene::options::EnvironmentSource;
+use crate::scene::options::{EnvironmentSource, LoadOptions};
 
 /// Most texels of a map: 8192 × 4096, which take 384 MiB.
 const MAX_TEXELS: u64 = 1 << 25;
@@ -20,121 +17,94 @@ const MAX_UNBACKED_TEXELS: u64 = 1 << 22;
 /// Most texels per byte of the file in larger maps.
 const MAX_RATIO: u64 = 64;
 
-/// Loads the sky. Texels that are negative or not finite become 0; a warning gives their number.
+/// Loads the sky, turned and scaled as the options say. Channels that are negative and texels that are not finite become
+/// 0; a warning gives their numbers.
 pub(super) fn load(
-    source: Option<&EnvironmentSource>,
+    options: &LoadOptions,
     inputs: &mut Inputs,
     warnings: &mut Vec<String>,
 ) -> Result<Environment, SceneError> {
-    match source {
-        None => Ok(Environment::None),
+    let scale = options.environment_scale;
+    let error = |file: &Path, what: String, remedy| SceneError::Image {
+        file: file.to_owned(),
+        place: "environment".to_owned(),
+        what,
+        remedy,
+    };
+    let (file, layer) = match &options.environment {
+        None => return Ok(Environment::None),
         Some(EnvironmentSource::Constant(radiance)) => {
-            if !radiance.is_finite() || radiance.min_element() < 0.0 {
-                return Err(SceneError::Image {
-                    file: "environment".into(),
-                    place: format!("{},{},{}", radiance.x, radiance.y, radiance.z),
-                    what: "negative or not finite".to_owned(),
-                    remedy: "give finite radiance from 0 up",
-                });
+            let scaled = *radiance * scale;
+            let [r, g, b] = scaled.to_array();
+            if !scaled.is_finite() || scaled.min_element() < 0.0 {
+                let what = format!("its radiance {r},{g},{b} is negative or not finite");
+                return Err(error(Path::new("sky"), what, "give finite radiance and scale from 0 up"));
             }
-            inputs.add(format!("{},{},{}", radiance.x, radiance.y, radiance.z).as_bytes());
-            Ok(Environment::Constant(*radiance))
+            // The scaled radiance alone is the sky: by which factors it came does not matter.
+            inputs.add(format!("{r},{g},{b}").as_bytes());
+            return Ok(Environment::Constant(scaled));
         }
-        Some(EnvironmentSource::File(path)) => {
-            let bytes = inputs.read(path).map_err(|cause| SceneError::Read {
-                file: path.clone(),
-                place: "environment map".to_owned(),
-                cause,
-                remedy: "check the path given to --env",
-            })?;
-            let mut map = decode(path, &bytes)?;
-            clean(path, &mut map, warnings);
-            Ok(Environment::Map(map))
-        }
+        Some(EnvironmentSource::Map { file, layer }) => (file, layer.as_deref()),
+    };
+    let bytes = inputs.read(file).map_err(|cause| SceneError::Read {
+        file: file.clone(),
+        place: "environment map".to_owned(),
+        cause,
+        remedy: "check the path given to --env",
+    })?;
+    let most_texels = MAX_TEXELS.min(MAX_UNBACKED_TEXELS.max(MAX_RATIO * bytes.len() as u64));
+    let Picture { width, height, pixels } = Picture::decode_light(file, &bytes, layer, most_texels)?;
+    let mut map = EnvironmentMap { width: width as usize, height: height as usize, texels: pixels };
+    clean(file, &mut map, warnings);
+    scale_texels(&mut map, scale).map_err(|what| error(file, what, "give a smaller --env-scale"))?;
+    let map = map.turned(options.environment_rotate_deg);
+    add_to_hash(options, layer, inputs);
+    Ok(Environment::Map(map))
+}
+
+/// Adds what makes another sky of the same file. A choice that changes nothing leaves the hash as it is.
+fn add_to_hash(options: &LoadOptions, layer: Option<&str>, inputs: &mut Inputs) {
+    if let Some(layer) = layer {
+        inputs.add(format!("layer {layer}").as_bytes());
+    }
+    let turn = options.environment_rotate_deg.rem_euclid(360.0);
+    if turn != 0.0 {
+        inputs.add(format!("turned {turn}").as_bytes());
+    }
+    if options.environment_scale != 1.0 {
+        inputs.add(format!("scaled {}", options.environment_scale).as_bytes());
     }
 }
 
-fn decode(path: &Path, bytes: &[u8]) -> Result<EnvironmentMap, SceneError> {
-    let result = if bytes.starts_with(&EXR_MAGIC) { decode_exr(bytes) } else { decode_hdr(bytes) };
-    let (file, place) = (path.to_owned(), "environment map".to_owned());
-    result.map_err(|failure| match failure {
-        Failure::Broken(what) => SceneError::Image {
-            file,
-            place,
-            what: sentence(&what),
-            remedy: "give an equirectangular .hdr or .exr of linear RGB",
-        },
-        Failure::TooLarge(what) => {
-            SceneError::TooLarge { file, place, what, remedy: "reduce the map; 8192×4096 is the most" }
-        }
-    })
-}
-
-/// The reason why a map was not decoded.
-enum Failure {
-    Broken(String),
-    TooLarge(String),
-}
-
-const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
-
-fn check_size(width: u64, height: u64, bytes: &[u8]) -> Result<(), Failure> {
-    let allowed = MAX_TEXELS.min(MAX_UNBACKED_TEXELS.max(MAX_RATIO * bytes.len() as u64));
-    match width.checked_mul(height) {
-        Some(0) => Err(Failure::Broken("it has no pixels".to_owned())),
-        Some(texels) if texels <= allowed => Ok(()),
-        _ => Err(Failure::TooLarge(format!(
-            "it has {width}×{height} pixels; a file of {} bytes may have at most {allowed}",
-            bytes.len()
-        ))),
+fn scale_texels(map: &mut EnvironmentMap, scale: f32) -> Result<(), String> {
+    map.texels.iter_mut().for_each(|texel| *texel *= scale);
+    match map.texels.iter().filter(|texel| !texel.is_finite()).count() {
+        0 => Ok(()),
+        beyond => Err(format!("scaled by {scale}, {beyond} texels exceed the largest 32-bit number")),
     }
-}
-
-fn decode_hdr(bytes: &[u8]) -> Result<EnvironmentMap, Failure> {
-    let broken = |what: &str, e: image::ImageError| Failure::Broken(format!("{what}: {e}"));
-    let decoder = HdrDecoder::new(Cursor::new(bytes)).map_err(|e| broken("neither HDR nor EXR", e))?;
-    let (width, height) = decoder.dimensions();
-    check_size(width.into(), height.into(), bytes)?;
-    let image = DynamicImage::from_decoder(decoder).map_err(|e| broken("it does not decode", e))?;
-    let texels = image.into_rgb32f().pixels().map(|p| Vec3::from_array(p.0)).collect();
-    Ok(EnvironmentMap { width: width as usize, height: height as usize, texels })
-}
-
-fn decode_exr(bytes: &[u8]) -> Result<EnvironmentMap, Failure> {
-    use exr::prelude::{MetaData, ReadChannels, ReadLayers, read};
-    let describe = |e: exr::error::Error| Failure::Broken(format!("it does not decode: {e}"));
-    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(describe)?;
-    for header in &meta.headers {
-        check_size(header.layer_size.0 as u64, header.layer_size.1 as u64, bytes)?;
-    }
-    let image = read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .rgb_channels(
-            |size, _| EnvironmentMap { width: size.0, height: size.1, texels: vec![Vec3::ZERO; size.0 * size.1] },
-            |map, at, (r, g, b): (f32, f32, f32)| {
-                let index = at.1 * map.width + at.0;
-                map.texels[index] = Vec3::new(r, g, b);
-            },
-        )
-        .first_valid_layer()
-        .all_attributes()
-        .non_parallel()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(describe)?;
-    Ok(image.layer_data.channel_data.pixels)
 }
 
 fn clean(path: &Path, map: &mut EnvironmentMap, warnings: &mut Vec<String>) {
-    let mut bad = 0;
+    let (mut negative, mut least, mut not_finite) = (0, 0.0_f32, 0);
     for texel in &mut map.texels {
-        if !texel.is_finite() || texel.min_element() < 0.0 {
+        if !texel.is_finite() {
             *texel = Vec3::ZERO;
-            bad += 1;
+            not_finite += 1;
+        } else if texel.min_element() < 0.0 {
+            negative += 1;
+            least = least.min(texel.min_element());
+            *texel = texel.max(Vec3::ZERO);
         }
     }
-    if bad > 0 {
-        warnings.push(format!("{}: {bad} texels are negative or not finite and count as black", path.display()));
+    let mut faults = Vec::new();
+    if negative > 0 {
+        faults.push(format!("{negative} texels have negative channels, down to {least}, which count as 0"));
+    }
+    if not_finite > 0 {
+        faults.push(format!("{not_finite} texels are not finite and count as black"));
+    }
+    if !faults.is_empty() {
+        warnings.push(format!("{}: {}", path.display(), faults.join("; ")));
     }
     if map.width != 2 * map.height {
         warnings.push(format!(

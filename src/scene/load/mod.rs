@@ -86,7 +86,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
     let origin = SceneOrigin { landmark: &landmark, centre };
     let lights = lights::lights(&document, &nodes, &origin, &mut warnings)?;
     let cameras = lights::cameras(&document, &nodes, &origin, &mut warnings)?;
-    let environment = environment::load(options.environment.as_ref(), &mut inputs, &mut warnings)?;
+    let environment = environment::load(options, &mut inputs, &mut warnings)?;
     let glows = |m: &Material| m.unlit || m.emission != Vec3::ZERO;
     if lights.is_empty() && environment.is_black() && !materials.materials.iter().any(glows) {
         warnings.push("nothing in the scene sends out light; give it a sky with --env 1,1,1".to_owned());

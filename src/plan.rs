@@ -11,7 +11,7 @@ use crate::probe::Grid;
 use crate::probe::lattice::ProbeState;
 use crate::probe::place::Placement;
 use crate::probe::transport::Transport;
-use crate::scene::{AlphaMode, Environment, Scene};
+use crate::scene::{AlphaMode, Environment, MaterialIndex, Scene};
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Line {
@@ -100,7 +100,8 @@ fn sky(scene: &Scene) -> Line {
 }
 
 fn alpha(scene: &Scene) -> Line {
-    let tested = scene.mesh.triangles.len() - scene.mesh.opaque_count;
+    let needs_test = |t: &&MaterialIndex| scene.materials[t.0 as usize].alpha_mode != AlphaMode::Opaque;
+    let tested = scene.mesh.materials.iter().filter(needs_test).count();
     let blended = scene.materials.iter().filter(|m| m.alpha_mode == AlphaMode::Blend).count();
     match tested {
         0 => line("alpha_test", false, "every surface is opaque"),

@@ -335,6 +335,27 @@ fn the_dark_region_is_where_the_reference_is_surely_dark() {
     assert_eq!(dark_region(&method, &bright, &shown), None);
 }
 
+/// Every pixel gets twice the light that would be dark, by one of fifty samples. With 32 of them half of the pixels find
+/// nothing, know of no variance, and are not dark all the same.
+#[test]
+fn few_samples_do_not_make_the_dark_region() {
+    let light = 2e-3f32;
+    let mut random = Random::new(3, Purpose::Pixel, 0, 0);
+    let mut block = || (0..16).map(|_| if random.uniform() < 0.02 { 50.0 * light } else { 0.0 }).sum::<f32>() / 16.0;
+    let blocks: Vec<[f32; 2]> = (0..PIXELS).map(|_| [block(), block()]).collect();
+    // A bright part makes the mean about 1.
+    let bright = PIXELS / 2;
+    let mean = |i: usize| if i < bright { 2.0 } else { (blocks[i][0] + blocks[i][1]) / 2.0 };
+    let variance = |i: usize| if i < bright { 0.0 } else { ((blocks[i][0] - blocks[i][1]) / 2.0).powi(2) };
+    let truth: Vec<Vec3> = (0..PIXELS).map(|i| Vec3::splat(mean(i))).collect();
+    let noise: Vec<Vec3> = (0..PIXELS).map(|i| Vec3::splat(variance(i))).collect();
+    let black = (bright..PIXELS).filter(|&i| truth[i] == Vec3::ZERO && noise[i] == Vec3::ZERO).count();
+    assert!(black > PIXELS / 5, "{black} pixels have seen nothing");
+    let mut reference = layers(&truth, Some(noise), None, None);
+    reference.noise.as_mut().expect("noise").blocks = Some(2);
+    assert_eq!(dark_region(&[Vec3::ONE; PIXELS], &reference, &[true; PIXELS]), None);
+}
+
 /// In a cube of side 2, of cosine-distributed rays from a point at the distance x from one wall the share
 /// (acos k − k·√(1 − k²))/π, k = x/R, meets that wall within R: their projections fill the unit disc evenly, and those beyond k
 /// meet it. A quarter do at k = 0.4040. R is 2 % of the diagonal 2√3.

@@ -3,8 +3,10 @@
 
     pip install numpy safetensors
     python3 scripts/readme/read_probes.py FILE.probes X Y Z NX NY NZ
+    python3 scripts/readme/read_probes.py FILE.probes - < POINTS
 
-Prints the irradiance (RGB, W/m²) at the world-space point X Y Z of a surface with the normal NX NY NZ.
+Prints the irradiance (RGB, W/m²) at the world-space point X Y Z of a surface with the normal NX NY NZ. With `-` it reads
+points from standard input, one a line; three more numbers on a line are the geometric normal, where it is another one.
 """
 
 import json
@@ -33,22 +35,26 @@ class Probes:
             self.meta = file.metadata()
             self.tensors = {name: file.get_tensor(name) for name in file.keys()}
         assert self.meta["format"] == "lightprobe/1", self.meta["format"]
+        self.reach_voxels, self.strip = 3, 0.25
         if "query" in self.meta:  # older files say it in their configuration
             self.check_weights(json.loads(self.meta["query"])["weights"])
         grid = json.loads(self.meta["grid"])
-        self.origin, self.spacing = np.array(grid["origin"]), np.array(grid["spacing"])
+        self.origin, self.spacing = np.array(grid["origin"]), np.array(grid["spacing"], np.float32)
         self.divisions, self.border = np.array(grid["divisions"]), grid["border"]
         self.cells = np.maximum(self.divisions - 1, 1)
         self.maps = self.unpack_irradiance()
 
-    @staticmethod
-    def check_weights(weights):
+    def check_weights(self, weights):
         """Refuses files that are asked in another way than this script asks."""
         plain = {"direction": "uniform", "blend": "linear", "trilinear_floor": 0.0, "weight_floor": 0.0}
         plain |= {"crush_below": 0.0, "normal_bias": 0.0, "view_bias": 0.0}
         other = [key for key, value in plain.items() if weights[key] != value]
-        if weights["test"] not in ("none", {"table": {"reach_voxels": 3, "strip": 0.25}}):
-            other.append("test")
+        if weights["test"] != "none":
+            if "table" in weights["test"]:
+                table = weights["test"]["table"]
+                self.reach_voxels, self.strip = table["reach_voxels"], table["strip"]
+            else:
+                other.append("test")
         if other:
             sys.exit(f"this script has the weights of the preset default only; the file differs in {', '.join(other)}")
 
@@ -72,7 +78,7 @@ class Probes:
         value = (top[x] * (1 - fx) + top[x1] * fx) * (1 - fy) + (bottom[x] * (1 - fx) + bottom[x1] * fx) * fy
         return value if self.meta["encoding.irradiance"] == "linear" else 2 * np.pi * value**5
 
-    def seen(self, base, fraction, normal):
+    def seen(self, g, base, fraction, normal):
         """Mask of the cell's eight probes that a surface sees, bit i for corner i, and a farther probe or None."""
         if "visibility" not in self.tensors:
             return 255, None  # left out by the plan: every surface sees all probes around it
@@ -81,24 +87,26 @@ class Probes:
         first, end = (int(i) for i in self.tensors["visibility_start"][cell : cell + 2])
         keys = self.tensors["visibility_key"][first:end].astype(int)
         masks = self.tensors["visibility"][first:end]
-        voxel = np.minimum((fraction * n).astype(int), n - 1)
+        voxel = np.minimum((fraction * np.float32(n)).astype(int), n - 1)
         axis = int(np.abs(normal).argmax())
         facing = 2 * axis + int(normal[axis] < 0)
 
         def key(v):
             return (v[0] + n * (v[1] + n * v[2])) * 6 + facing
 
+        # The survey covers the probes' hull. Beyond it the nearest surface of the rim has to do.
+        surveyed = len(keys) > 0 and bool(np.all(g >= 0) and np.all(g <= self.divisions - 1))
         entry = self.find(keys, key(voxel))
         if entry is None:
-            entry = self.nearest(keys, voxel, facing, n)
+            entry = self.nearest(keys, voxel, facing, n, self.reach_voxels if surveyed else 2 * n)
         if entry is None:
-            return 255, None
+            return (0 if surveyed else 255), None
         if masks[entry]:
             return masks[entry], None
         # None of the eight: the voxel across a border that is near, else a farther probe.
-        inside = fraction * n - voxel
-        step = np.where(inside < 0.25, -1, np.where(inside > 0.75, 1, 0))
-        step = np.where((voxel + step < 0) | (voxel + step >= n), 0, step)
+        inside = fraction * np.float32(n) - voxel.astype(np.float32)
+        low, high = (inside < self.strip) & (voxel > 0), (inside > 1 - self.strip) & (voxel < n - 1)
+        step = np.where(low, -1, np.where(high, 1, 0))
         for axes in ([0], [1], [2], [0, 1], [0, 2], [1, 2], [0, 1, 2]):
             if all(step[axes]):
                 neighbour = voxel.copy()
@@ -116,23 +124,21 @@ class Probes:
         return i if i < len(keys) and keys[i] == key else None
 
     @staticmethod
-    def nearest(keys, voxel, facing, n):
-        """The nearest voxel with an entry that faces the same way, else any entry of the same voxel."""
+    def nearest(keys, voxel, facing, n, reach):
+        """The entry of the nearest voxel that faces the same way, at most `reach` voxels away."""
         same = np.flatnonzero(keys % 6 == facing)
-        if same.size:
-            of = keys[same] // 6
-            offset = np.stack([of % n, of // n % n, of // n**2], axis=-1) - voxel
-            return int(same[(offset**2).sum(axis=1).argmin()])
-        here = np.flatnonzero(keys // 6 == voxel[0] + n * (voxel[1] + n * voxel[2]))
-        return int(here[0]) if here.size else None
+        of = keys[same] // 6
+        squared = ((np.stack([of % n, of // n % n, of // n**2], axis=-1) - voxel) ** 2).sum(axis=1)
+        return int(same[squared.argmin()]) if same.size and squared.min() <= reach**2 else None
 
     def irradiance(self, position_world, normal, geometric_normal=None):
         """W/m², at a point of a surface; `geometric_normal` on the viewer's side, `normal` where not given."""
         geometric_normal = normal if geometric_normal is None else geometric_normal
-        g = (position_world - self.origin) / self.spacing
-        base = np.clip(np.floor(g), 0, self.cells - 1).astype(int)
-        fraction = np.where(self.divisions > 1, np.clip(g - base, 0, 1), 0)
-        mask, far = self.seen(base, fraction, geometric_normal)
+        # Single precision, as in the tool: on the borders of cells and voxels the rounding decides.
+        g = (position_world - self.origin).astype(np.float32) / self.spacing
+        base = np.minimum(np.maximum(g, 0).astype(int), self.cells - 1)
+        fraction = np.where(self.divisions > 1, np.clip(g - base.astype(np.float32), 0, 1), 0).astype(np.float32)
+        mask, far = self.seen(g, base, fraction, geometric_normal)
         if far is not None:
             return self.probe_irradiance(far, normal)
         total, weights = np.zeros(3), 0.0
@@ -146,11 +152,19 @@ class Probes:
         return total / weights if weights > 0 else total
 
 
+def unit(vector):
+    return vector / np.linalg.norm(vector)
+
+
 def main():
-    if len(sys.argv) != 8:
+    if len(sys.argv) not in (3, 8) or (len(sys.argv) == 3 and sys.argv[2] != "-"):
         sys.exit(__doc__.strip())
-    point, normal = np.array(sys.argv[2:5], float), np.array(sys.argv[5:8], float)
-    print(*Probes(sys.argv[1]).irradiance(point, normal / np.linalg.norm(normal)))
+    probes = Probes(sys.argv[1])
+    for line in [" ".join(sys.argv[2:])] if len(sys.argv) == 8 else sys.stdin:
+        numbers = np.array(line.split(), float)
+        if len(numbers) not in (6, 9):
+            sys.exit(f"6 or 9 numbers are wanted, not {line.strip()!r}")
+        print(*probes.irradiance(numbers[:3], unit(numbers[3:6]), unit(numbers[-3:])))
 
 
 if __name__ == "__main__":

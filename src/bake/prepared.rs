@@ -7,6 +7,7 @@ use super::log::Log;
 use super::memory::Memory;
 use crate::config::{Config, VISIBILITY};
 use crate::light::World;
+use crate::light::contact::Contacts;
 use crate::plan::Plan;
 use crate::probe::capture::{Capture, ProbeCapture};
 use crate::probe::lattice::ProbeState;
@@ -24,6 +25,8 @@ pub struct Prepared<'w, 's> {
     pub config: &'w Config,
     pub grid: Grid,
     pub placement: Placement,
+    /// The probes that lie in a surface.
+    contacts: Contacts,
     pub plan: Plan,
     pub survey_s: f64,
     pub(super) memory: Memory,
@@ -57,7 +60,8 @@ pub fn prepare<'w, 's>(
         log.stage(|times| &mut times.survey, "placing", 1, |bar| place(world, &task, || bar.set_prefix("surveying")));
     let plan = Plan::new(world, config, &grid, &placement);
     let hull = grid.hull(HULL_TOLERANCE);
-    Ok(Prepared { world, config, grid, placement, plan, survey_s: log.times.survey, memory, hull })
+    let contacts = Contacts::of_points(world.scene, &placement.positions);
+    Ok(Prepared { world, config, grid, placement, contacts, plan, survey_s: log.times.survey, memory, hull })
 }
 
 impl Prepared<'_, '_> {
@@ -92,7 +96,7 @@ impl Prepared<'_, '_> {
 
     /// Traces one active probe.
     pub(super) fn trace(&self, capture: &Capture, probe: usize) -> ProbeCapture {
-        let position = self.placement.positions[probe];
+        let position = self.contacts.viewpoint(probe, self.placement.positions[probe]);
         let (low, high) = self.hull;
         capture.probe(probe, position, |p| p.cmpge(low).all() && p.cmple(high).all())
     }

@@ -2,6 +2,7 @@
 //! `reference` all use these functions.
 
 pub mod bsdf;
+pub mod contact;
 pub mod emitters;
 pub mod ggx;
 pub mod lambert;
@@ -14,6 +15,7 @@ pub mod surface;
 
 use crate::scene::{Material, Scene};
 use crate::trace::{TraceError, Tracer};
+use contact::Contacts;
 use emitters::Emitters;
 use places::Places;
 use surface::SurfaceTable;
@@ -25,6 +27,8 @@ pub struct World<'s> {
     pub emitters: Emitters,
     pub surfaces: SurfaceTable,
     pub places: Places,
+    /// The punctual lights that lie in a surface.
+    pub light_contacts: Contacts,
     /// Factor on all punctual lights. Some exporters multiply punctual lights by 683 but not emission; this undoes it.
     pub punctual_scale: f32,
     /// Largest albedo per channel. Larger albedos are clamped to it, so that the sum over bounces converges.
@@ -40,6 +44,7 @@ impl<'s> World<'s> {
             emitters: Emitters::new(scene),
             surfaces: SurfaceTable::new(scene),
             places: Places::new(scene),
+            light_contacts: Contacts::of_lights(scene),
             punctual_scale,
             albedo_max,
         })

@@ -263,8 +263,8 @@ impl World<'_> {
         // Reservoir sampling with a single random number. After each decision the number is rescaled and is uniform
         // again.
         let mut total = 0.0;
-        let mut chosen: Option<(Incident, Vec3, f32)> = None;
-        for light in lights {
+        let mut chosen: Option<(usize, Incident, Vec3, f32)> = None;
+        for (index, light) in lights.iter().enumerate() {
             let Some(incident) = incident(light, point.position) else { continue };
             let cosine = bsdf.normal().dot(incident.direction);
             if cosine <= 0.0 || point.geometric_normal.dot(incident.direction) <= 0.0 {
@@ -280,15 +280,15 @@ impl World<'_> {
             let probability = importance / total;
             if number < probability {
                 number /= probability;
-                chosen = Some((incident, radiance, importance));
+                chosen = Some((index, incident, radiance, importance));
             } else {
                 number = (number - probability) / (1.0 - probability);
             }
         }
-        let Some((incident, radiance, importance)) = chosen else { return Vec3::ZERO };
+        let Some((index, incident, radiance, importance)) = chosen else { return Vec3::ZERO };
         rays.shadow += 1;
-        let ray = Ray { t_max: incident.distance, ..Ray::new(point.ray_origin(), incident.direction, numbers.salt()) };
-        if self.tracer.occluded(ray) { Vec3::ZERO } else { radiance * (self.punctual_scale * (total / importance)) }
+        let reaches = self.light_reaches(index, &incident, point.ray_origin(), numbers.salt());
+        if reaches { radiance * (self.punctual_scale * (total / importance)) } else { Vec3::ZERO }
     }
 }
 

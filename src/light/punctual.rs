@@ -65,6 +65,19 @@ impl World<'_> {
         self.punctual_sum(point, bsdf.normal(), salt, |direction, cosine| bsdf.scattered(direction, cosine).total()).0
     }
 
+    /// Whether no surface blocks the light of the scene's light `index`, which arrives as `incident`, before `origin`. A
+    /// surface that contains the light does not block it on the side that [`super::contact`] gives. No light reaches
+    /// points of that surface's own plane, because it would arrive at a right angle to their normal.
+    #[inline]
+    pub fn light_reaches(&self, index: usize, incident: &Incident, origin: Vec3, salt: u32) -> bool {
+        let ray = match self.light_contacts.of(index) {
+            None => Ray { origin, direction: incident.direction, t_max: incident.distance, salt },
+            Some(contact) if contact.shares_plane(origin) => return false,
+            Some(contact) => Ray::segment(origin, contact.target(origin), salt),
+        };
+        !self.tracer.occluded(ray)
+    }
+
     /// The sum of irradiance × `response` over the lights that no surface occludes, and the number of shadow rays.
     /// `response` takes the direction to the light and its cosine to the normal.
     #[inline]
@@ -78,7 +91,7 @@ impl World<'_> {
         let origin = point.ray_origin();
         let mut rays = 0;
         let mut sum = Vec3::ZERO;
-        for light in &self.scene.lights {
+        for (index, light) in self.scene.lights.iter().enumerate() {
             let Some(incident) = incident(light, point.position) else { continue };
             let cosine = normal.dot(incident.direction);
             // Light from below the surface cannot arrive, even if the shading normal faces it.
@@ -86,8 +99,7 @@ impl World<'_> {
                 continue;
             }
             rays += 1;
-            let t_max = incident.distance;
-            if !self.tracer.occluded(Ray { origin, direction: incident.direction, t_max, salt }) {
+            if self.light_reaches(index, &incident, origin, salt) {
                 sum += incident.irradiance * response(incident.direction, cosine);
             }
         }

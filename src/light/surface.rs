@@ -108,7 +108,7 @@ impl SurfaceTable {
             let emission = if material.unlit { uniform } else { material.emission_texture.is_none() };
             MaterialConstants {
                 albedo: triangle.filter(|_| albedo).map(|t| scene.albedo(t, Vec2::ZERO)),
-                emission: triangle.filter(|_| emission).map(|t| scene.emission(t, Vec2::ZERO)),
+                emission: triangle.filter(|_| emission).map(|t| scene.uncovered_emission(t, Vec2::ZERO)),
             }
         });
         let constants: Vec<MaterialConstants> = constants.collect();

@@ -2,9 +2,11 @@
 
 pub mod alias;
 pub mod blocks;
+pub mod box_tree;
 pub mod color;
 pub mod fibonacci;
 pub mod octahedral;
+pub mod offset;
 pub mod primaries;
 pub mod random;
 pub mod sampling;

@@ -6,6 +6,7 @@
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::reference_layers::ReferenceLayers;
 use crate::math::color::luminance;
@@ -37,11 +38,20 @@ pub struct Leak {
 /// A pixel is dark if its irradiance is below this share of the reference's mean over the picture.
 const DARK_SHARE: f64 = 1.0e-3;
 
-/// Margin of the test for dark pixels, in standard errors of the pixel's luminance.
-const DARK_SIGMAS: f64 = 3.0;
+/// Chance that noise alone makes a pixel of just this share look dark, if noise is normal: that of 3 standard errors on
+/// one side.
+const DARK_CHANCE: f64 = 1.349_898e-3;
+
+/// Pixels to each side over which the variance is averaged. A pixel's own variance is far too small by chance if few
+/// blocks found the light that reaches it.
+const DARK_WINDOW: usize = 2;
 
 /// Mean luminance of the indirect `irradiance` over dark pixels ÷ mean(E_ref). Dark pixels are those with
-/// E_ref + 3σ < 10⁻³·mean(E_ref), where σ is the standard error of E_ref.
+/// E_ref + t·σ < 10⁻³·mean(E_ref).
+///
+/// σ² is the larger of the pixel's variance and the mean variance of the 5×5 pixels around it. t is the quantile of
+/// Student's distribution for [`DARK_CHANCE`]; its degrees of freedom are one less than the blocks, times the pixels
+/// of the window.
 ///
 /// `shown` tells for each pixel whether it shows a surface. The result is `None` if no pixel is dark, if the whole
 /// reference is black, or if σ is not known.
@@ -53,11 +63,36 @@ pub fn dark_region(irradiance: &[Vec3], reference: &ReferenceLayers, shown: &[bo
     let noise = reference.noise.as_ref()?;
     let used = |i: usize| shown[i] && reference.is_finite(i) && irradiance[i].is_finite();
     let mean = reference.means(used).0.filter(|mean| *mean > 0.0)?;
-    let most =
-        |i: usize| f64::from(luminance(reference.irradiance[i])) + DARK_SIGMAS * noise.luminance_variance(i).sqrt();
-    let dark = (0..irradiance.len()).filter(|&i| used(i) && most(i) < DARK_SHARE * mean);
-    let dark: Moments = dark.map(|i| f64::from(luminance(irradiance[i]))).collect();
+    let least = |i: usize| f64::from(luminance(reference.irradiance[i]));
+    let variances: Vec<f64> = (0..irradiance.len()).map(|i| noise.luminance_variance(i)).collect();
+    let quantiles = quantiles(noise.blocks);
+    let most = |i: usize| {
+        let around: Moments = window(i, reference).filter(|&j| used(j)).map(|j| variances[j]).collect();
+        let quantile = quantiles[(around.weight() as usize).min(WINDOW_PIXELS) - 1];
+        least(i) + quantile * around.mean().max(variances[i]).sqrt()
+    };
+    let is_dark = |i: &usize| used(*i) && least(*i) < DARK_SHARE * mean && most(*i) < DARK_SHARE * mean;
+    let dark: Moments = (0..irradiance.len()).filter(is_dark).map(|i| f64::from(luminance(irradiance[i]))).collect();
     (dark.weight() > 0.0).then(|| dark.mean() / mean)
+}
+
+const WINDOW_PIXELS: usize = (2 * DARK_WINDOW + 1) * (2 * DARK_WINDOW + 1);
+
+/// The pixels of the window around a pixel, as far as the picture reaches.
+fn window(pixel: usize, reference: &ReferenceLayers) -> impl Iterator<Item = usize> {
+    let (width, height) = (reference.width as usize, reference.height as usize);
+    let along = |at: usize, size: usize| at.saturating_sub(DARK_WINDOW)..(at + DARK_WINDOW + 1).min(size);
+    let columns = along(pixel % width, width);
+    along(pixel / width, height).flat_map(move |y| columns.clone().map(move |x| y * width + x))
+}
+
+/// Quantile for [`DARK_CHANCE`] of a variance from `blocks` blocks of each of 1, 2, … pixels.
+fn quantiles(blocks: Option<u32>) -> Vec<f64> {
+    // Where the number of blocks is not known, it is taken for large.
+    let freedom = |pixels: usize| blocks.map_or(1e6, |b| f64::from(b.max(2) - 1) * pixels as f64);
+    let quantile =
+        |pixels| StudentsT::new(0.0, 1.0, freedom(pixels)).map_or(f64::INFINITY, |t| t.inverse_cdf(1.0 - DARK_CHANCE));
+    (1..=WINDOW_PIXELS).map(quantile).collect()
 }
 
 /// The leak figures of one visibility mode, except `dark_region` and `baked`. `irradiance` is that of the mode and

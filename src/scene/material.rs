@@ -42,6 +42,13 @@ pub struct Material {
     pub unlit: bool,
 }
 
+impl Material {
+    /// Whether the factors allow any emission. Textures may still be black.
+    pub fn emits(&self) -> bool {
+        self.unlit || self.emission != Vec3::ZERO
+    }
+}
+
 /// A texture as one material slot uses it.
 #[derive(Debug, Clone, Copy)]
 pub struct TextureRef {

@@ -4,7 +4,7 @@ use std::ops::{Add, Mul};
 
 use glam::{Vec2, Vec3, Vec4};
 
-use super::MaterialIndex;
+use super::{Covers, MaterialIndex};
 
 /// Index of a triangle in [`Mesh::triangles`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -31,8 +31,11 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// One per triangle.
     pub materials: Vec<MaterialIndex>,
-    /// Number of triangles with [`super::AlphaMode::Opaque`] materials. They come first; the rest need an alpha test.
+    /// Number of triangles that stop every ray that hits them. They come first. The others need an alpha test or lie
+    /// in [`Mesh::covers`].
     pub opaque_count: usize,
+    /// Parts of triangles that rays pass, because an emitter or its surroundings lie in front in the same plane.
+    pub covers: Covers,
 }
 
 impl Mesh {

@@ -4,6 +4,7 @@
 //! stands 10⁶ m from the world's origin keeps its millimetres.
 
 pub mod camera;
+mod cover;
 pub mod environment;
 mod error;
 pub mod light;
@@ -16,6 +17,7 @@ pub mod range;
 mod texture;
 
 pub use camera::Camera;
+pub use cover::{Cover, Covers};
 pub use environment::Environment;
 pub use error::SceneError;
 pub use light::{LightKind, PunctualLight};

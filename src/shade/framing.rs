@@ -62,10 +62,9 @@ pub fn frame(world: &World, bounds: (Vec3, Vec3)) -> (Camera, bool) {
 /// number of rays that hit fronts of surfaces, and whether any light is visible.
 fn look_around(world: &World, position: Vec3) -> (f32, Vec3, usize, bool) {
     let (mut nearest, mut farthest, mut direction, mut fronts) = (f32::INFINITY, 0.0, Vec3::NEG_Z, 0);
-    let mut lit =
-        world.scene.lights.iter().filter_map(|light| incident(light, position)).any(|light| {
-            !world.tracer.occluded(Ray { t_max: light.distance, ..Ray::new(position, light.direction, 0) })
-        });
+    let mut lit = world.scene.lights.iter().enumerate().any(|(index, light)| {
+        incident(light, position).is_some_and(|light| world.light_reaches(index, &light, position, 0))
+    });
     for i in 0..DIRECTIONS {
         let d = fibonacci::direction(i, DIRECTIONS);
         let Some(surface) = world.surface(Ray::new(position, d, i as u32)) else {

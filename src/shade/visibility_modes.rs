@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::points::ImagePoint;
 use crate::light::World;
+use crate::light::contact::{Contacts, Facet, sight_line};
 use crate::probe::query::{Query, Visibility};
 use crate::trace::Ray;
 
@@ -56,20 +57,22 @@ impl VisibilityMode {
 /// A probe is visible if no surface blocks the segment from P + ε·n_g to the probe, where n_g is the geometric normal
 /// on the viewer's side and ε the ray offset of the surface. The segment starts at the surface, as in the survey,
 /// because ε accounts for the rounding there. A ray from a probe farther from the scene's origin would need a larger
-/// offset.
+/// offset. Probes in the plane of a surface follow [`sight_line`].
 pub fn exact_masks(world: &World, query: &Query, points: &[ImagePoint]) -> Vec<u8> {
     let volume = query.volume;
+    let contacts = Contacts::of_points(world.scene, &volume.positions);
     points
         .par_iter()
         .map(|point| {
-            let origin = point.surface.ray_origin();
+            let surface = &point.surface;
+            let facet =
+                Facet { position: surface.position, normal: surface.geometric_normal, offset: surface.ray_offset };
             let corners = volume.grid.corners_around(&query.cell(&point.query));
             corners.into_iter().enumerate().fold(0, |mask, (i, probe)| {
-                let position = volume.position(probe);
-                // A probe behind the surface is hidden by the surface itself.
-                let visible = volume.is_active(probe)
-                    && (position - origin).dot(point.surface.geometric_normal) > 0.0
-                    && !world.tracer.occluded(Ray::segment(origin, position, point.pixel));
+                let contact = contacts.of(probe.0 as usize);
+                let is_free = |(origin, target)| !world.tracer.occluded(Ray::segment(origin, target, point.pixel));
+                let visible =
+                    volume.is_active(probe) && sight_line(&facet, volume.position(probe), contact).is_some_and(is_free);
                 mask | u8::from(visible) << i
             })
         })

@@ -7,9 +7,9 @@
 
 mod alpha;
 mod ffi;
-pub mod offset;
 mod tracer;
 
+pub use crate::math::offset;
 pub use tracer::{Hit, Ray, RayLog, Tracer};
 
 /// Why rays cannot be traced.

@@ -63,8 +63,8 @@ pub struct Hit {
 
 /// A committed Embree scene over all triangles of a [`Scene`].
 ///
-/// Opaque triangles are geometry 0. Triangles with an alpha test are geometry 1, and only these have the filter
-/// function, so opaque triangles cost nothing extra. Any number of threads may query at once.
+/// Opaque triangles are geometry 0. Triangles with an alpha test and covered ones are geometry 1, and only these have the
+/// filter function, so other triangles cost nothing extra. Any number of threads may query at once.
 pub struct Tracer<'s> {
     handle: sys::RTCScene,
     /// First triangle of each geometry.

@@ -155,7 +155,7 @@ impl EmissiveTriangle {
 fn is_constant(scene: &Scene, index: TriangleIndex) -> bool {
     let material = scene.material(index);
     let textured = material.emission_texture.is_some() || material.base_color_texture.is_some();
-    !textured && scene.mesh.colors.is_empty()
+    !textured && scene.mesh.colors.is_empty() && scene.mesh.covers.of(index).is_empty()
 }
 
 /// Where the pieces of a triangle are found.

@@ -13,6 +13,7 @@ use super::settings::SurveySettings;
 use super::settle::Settler;
 use super::survey::Survey;
 use crate::light::World;
+use crate::light::contact::Contacts;
 use crate::probe::lattice::ProbeState;
 use crate::probe::lattice::grid::{CellIndex, Grid, ProbeIndex};
 use crate::probe::store::surface::{Entry, SurfaceVisibility};
@@ -118,6 +119,7 @@ pub fn far_probes(
     table: &SurfaceVisibility,
     settings: &SurveySettings,
 ) -> Vec<(u32, u32)> {
+    let contacts = Contacts::of_points(world.scene, &placement.positions);
     let of_cell = |cell: u32| -> Vec<(u32, u32)> {
         let cell = CellIndex(cell);
         let in_need: Vec<Entry> = table.entries(cell).filter(|entry| entry.mask == 0).collect();
@@ -131,7 +133,8 @@ pub fn far_probes(
             .iter()
             .filter_map(|entry| {
                 let need = need(world, grid, table, cell, entry, settings.voxel_margin);
-                let seen = rings.iter().find_map(|ring| nearest_visible(&world.tracer, placement, ring, &need))?;
+                let seen =
+                    rings.iter().find_map(|ring| nearest_visible(&world.tracer, placement, &contacts, ring, &need))?;
                 Some((entry.index as u32, seen.0))
             })
             .collect()
@@ -141,13 +144,20 @@ pub fn far_probes(
 }
 
 /// The nearest of some probes that a surface sees.
-fn nearest_visible(tracer: &Tracer, placement: &Placement, probes: &[ProbeIndex], need: &Need) -> Option<ProbeIndex> {
+fn nearest_visible(
+    tracer: &Tracer,
+    placement: &Placement,
+    contacts: &Contacts,
+    probes: &[ProbeIndex],
+    need: &Need,
+) -> Option<ProbeIndex> {
     let position = |probe: ProbeIndex| placement.positions[probe.0 as usize];
     let distance = |probe: ProbeIndex| position(probe).distance_squared(need.point);
     let mut before: Vec<ProbeIndex> =
         probes.iter().copied().filter(|&p| (position(p) - need.point).dot(need.normal) > 0.0).collect();
     before.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
-    before.into_iter().find(|&p| !tracer.occluded(Ray::segment(position(p), need.point, 0)))
+    let start = |p: ProbeIndex| contacts.of(p.0 as usize).map_or(position(p), |contact| contact.target(need.point));
+    before.into_iter().find(|&p| !tracer.occluded(Ray::segment(start(p), need.point, 0)))
 }
 
 /// A place from which the surface can be seen; `None` where its surroundings are the inside of something.

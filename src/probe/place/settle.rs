@@ -7,6 +7,7 @@ use super::placement::{Placement, PlacementTask};
 use super::sampled::sampled_probes;
 use super::settings::{PlacementRule, SettleSettings};
 use crate::light::World;
+use crate::light::contact::Contacts;
 use crate::math::fibonacci;
 use crate::probe::lattice::{Grid, ProbeState};
 use crate::trace::Ray;
@@ -44,13 +45,16 @@ struct Settled {
 pub fn settle_all(world: &World, task: &PlacementTask) -> Placement {
     let PlacementTask { grid, settings, .. } = *task;
     let sampled = sampled_probes(grid, &world.scene.mesh, task.reach);
+    let grid_points: Vec<Vec3> = grid.probes().map(|p| grid.grid_point(p)).collect();
+    let contacts = Contacts::of_points(world.scene, &grid_points);
     let of_probe = |probe: usize| -> Settled {
-        let position = grid.grid_point(crate::probe::ProbeIndex(probe as u32));
+        let position = grid_points[probe];
+        let viewpoint = contacts.viewpoint(probe, position);
         if !sampled[probe] && !settings.keep_unsampled {
             return Settled { state: ProbeState::NeverSampled, position, rays: 0, moved: false };
         }
         match &settings.rule {
-            PlacementRule::Settle(rule) => Settler { world, grid, settings: rule }.settle(position),
+            PlacementRule::Settle(rule) => Settler { world, grid, settings: rule }.settle(position, viewpoint),
             PlacementRule::GridPoints => Settled { state: ProbeState::Active, position, rays: 0, moved: false },
         }
     };
@@ -119,9 +123,10 @@ impl Settler<'_, '_> {
         (distance < self.metres(self.settings.min_clearance)).then(|| position - direction * (clearance - distance))
     }
 
-    /// State of the probe of a grid point, and the position that it settles at.
-    fn settle(&self, grid_point: Vec3) -> Settled {
-        let first = self.look(grid_point);
+    /// State of the probe of a grid point, and the position that it settles at. `viewpoint` is where rays from the grid
+    /// point start.
+    fn settle(&self, grid_point: Vec3, viewpoint: Vec3) -> Settled {
+        let first = self.look(viewpoint);
         let mut rays = first.rays;
         let (mut best, mut best_around, mut moved) = (grid_point, first, false);
         if self.settings.relocate {

@@ -7,6 +7,7 @@ use super::overlap::triangle_meets_box;
 use super::placement::Placement;
 use super::settings::SurveySettings;
 use crate::light::World;
+use crate::light::contact::{Contacts, Facet, sight_line};
 use crate::math::random::{Purpose, Random};
 use crate::probe::lattice::grid::{CellIndex, Grid};
 use crate::probe::store::surface::{Facing, SurfaceVisibility, active_corners, key, voxel_of_key};
@@ -89,7 +90,8 @@ impl Survey {
         settings: &SurveySettings,
         seed: u64,
     ) -> Survey {
-        let surveyor = Surveyor { world, grid, placement, n: voxels_per_cell, settings, seed };
+        let contacts = Contacts::of_points(world.scene, &placement.positions);
+        let surveyor = Surveyor { world, contacts: &contacts, grid, placement, n: voxels_per_cell, settings, seed };
         let triangles = world.scene.mesh.triangles.len() as u32;
         let mut sides: Vec<Side> = (0..triangles).into_par_iter().flat_map_iter(|t| surveyor.triangle(t)).collect();
         // Sums of counts do not depend on the order, so neither does the result.
@@ -133,6 +135,7 @@ struct Surveyor<'a, 's> {
     world: &'a World<'s>,
     grid: &'a Grid,
     placement: &'a Placement,
+    contacts: &'a Contacts,
     n: u32,
     settings: &'a SurveySettings,
     seed: u64,
@@ -252,21 +255,19 @@ impl Surveyor<'_, '_> {
             tally.edge_only |= !inside;
             let position =
                 corners[0] + (corners[1] - corners[0]) * barycentric.x + (corners[2] - corners[0]) * barycentric.y;
-            let origin = position + normal * ray_offset(corners);
+            let facet = Facet { position, normal, offset: ray_offset(corners) };
             let mut seen = 0u8;
             for (corner, probe) in probes.iter().enumerate() {
                 if active >> corner & 1 == 0 {
                     continue;
                 }
-                let probe = self.placement.positions[probe.0 as usize];
-                // A probe behind the surface is hidden by the surface itself.
-                if (probe - origin).dot(normal) <= 0.0 {
-                    continue;
-                }
+                let probe = probe.0 as usize;
+                let line = sight_line(&facet, self.placement.positions[probe], self.contacts.of(probe));
+                let Some((origin, target)) = line else { continue };
                 tally.rays += 1;
                 // From the surface: most rays that are blocked are blocked near it, where walls and solids meet, and
                 // Embree looks there first.
-                seen |= u8::from(!self.world.tracer.occluded(Ray::segment(origin, probe, random.bits()))) << corner;
+                seen |= u8::from(!self.world.tracer.occluded(Ray::segment(origin, target, random.bits()))) << corner;
             }
             tally.points += u8::from(seen != 0);
             (0..8).for_each(|corner| tally.visible[corner] += seen >> corner & 1);

@@ -8,6 +8,7 @@ use glam::Vec3A;
 use rayon::prelude::*;
 
 use crate::light::World;
+use crate::light::contact::Contacts;
 use crate::probe::Volume;
 use crate::probe::capture::{Capture, CaptureSettings, HitLight};
 use crate::probe::lattice::ProbeState;
@@ -39,6 +40,7 @@ impl Truth {
     ) -> Truth {
         let kernel = volume.irradiance.kernel(&settings.rays.directions());
         let axes = volume.irradiance.axes();
+        let contacts = Contacts::of_points(world.scene, &volume.positions);
         let bar = progress.stage("path-traced probes", RUNS as usize * volume.active_count());
         let run = |run: u64| -> Vec<Vec<Vec3A>> {
             let capture = Capture {
@@ -52,7 +54,7 @@ impl Truth {
                 if volume.states[p] != ProbeState::Active {
                     return Vec::new();
                 }
-                let traced = capture.probe(p, volume.positions[p], |_| true);
+                let traced = capture.probe(p, contacts.viewpoint(p, volume.positions[p]), |_| true);
                 bar.inc(1);
                 let mut radiance = traced.emitted_radiance();
                 traced.surfels.iter().for_each(|s| radiance[s.texel as usize] += Vec3A::from(s.direct_radiance));

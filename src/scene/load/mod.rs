@@ -6,6 +6,7 @@
 mod accessor;
 mod buffers;
 mod container;
+mod coplanar;
 mod document;
 mod draws;
 mod environment;
@@ -25,8 +26,6 @@ mod textures;
 mod transform;
 
 use std::path::Path;
-
-use glam::Vec3;
 
 use self::buffers::Buffers;
 use self::document::Document;
@@ -77,18 +76,24 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
     let mut textures = Textures::new(&document, &buffers, &mut inputs, options.collapse_constant_images);
     let materials = Materials::load(&document, &draws, &mut textures, &mut warnings)?;
     let textures = textures.textures;
-    let Flattened { mesh, centre, dropped } = flatten(&draws, &landmark, &materials);
+    let Flattened { mut mesh, centre, dropped } = flatten(&draws, &landmark, &materials);
     report_dropped(&dropped, &mut warnings);
     if mesh.triangles.is_empty() {
         return Err(empty(format!("all of the scene's {} triangles are degenerate", dropped.total())));
+    }
+
+    let emitters = coplanar::settle(&mut mesh, &materials.materials);
+    if emitters > 0 {
+        warnings.push(format!(
+            "{emitters} emissive triangles lie in the plane of another surface; the side that emits counts as in front"
+        ));
     }
 
     let origin = SceneOrigin { landmark: &landmark, centre };
     let lights = lights::lights(&document, &nodes, &origin, &mut warnings)?;
     let cameras = lights::cameras(&document, &nodes, &origin, &mut warnings)?;
     let environment = environment::load(options, &mut inputs, &mut warnings)?;
-    let glows = |m: &Material| m.unlit || m.emission != Vec3::ZERO;
-    if lights.is_empty() && environment.is_black() && !materials.materials.iter().any(glows) {
+    if lights.is_empty() && environment.is_black() && !materials.materials.iter().any(Material::emits) {
         warnings.push("nothing in the scene sends out light; give it a sky with --env 1,1,1".to_owned());
     }
     Ok(Scene {

@@ -9,6 +9,7 @@
 //! were all 270 independent. Seeds are fixed, so the outcome is.
 
 mod blended;
+mod coincident;
 mod furnace;
 mod gltf;
 mod lights;

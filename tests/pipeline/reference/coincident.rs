@@ -65,7 +65,8 @@ fn direct(gltf: Gltf, at: [f64; 3]) -> [f64; 2] {
             *share += of_exact / 49.0;
         }
     }
-    found
+    // The rounding of single points is checked above.
+    found.map(|share| (share * 1e4).round() / 1e4)
 }
 
 /// Lamps in the plane of a ceiling, and a micrometre on either side: all below it is lit. Behind a single-sided ceiling it
@@ -84,7 +85,7 @@ fn a_lamp_in_a_ceiling_lights_the_room() {
                 });
                 let (lamp, node) = light(kind, at);
                 add_light(&mut gltf, lamp, node);
-                direct(gltf, at).map(|share| (share * 1e4).round() / 1e4)
+                direct(gltf, at)
             };
             for kind in ["point", "spot"] {
                 assert_eq!(case(kind, &[(true, plain())]), [1.0, 0.0], "{kind} at {at:?}");
@@ -243,7 +244,7 @@ fn a_lamp_in_the_plane_of_the_ceiling_lights_as_if_alone() {
                 assert!(scene.warnings.iter().any(|w| w.contains("plane of another surface")), "{:?}", scene.warnings);
                 let world = world(&scene);
                 let from = (turn * DVec3::new(0.0, 0.9, 0.0)).to_array();
-                let camera: Camera = camera(&scene, from, (turn * DVec3::new(0.1, -1.0, 0.1)).to_array(), 40.0);
+                let camera: Camera = camera(&scene, from, (turn * DVec3::new(0.1, -1.0, 0.1)).to_array(), 30.0);
                 let exact: Vec<DVec3> = points(&world, &camera)
                     .iter()
                     .map(|(_, place)| (turn.inverse() * *place).to_array())

@@ -59,7 +59,7 @@ impl World<'_> {
     fn learn_place(&self, key: usize) -> Shares {
         let mut random = Random::new(0, Purpose::Places, key as u64, 0);
         let points = self.points_of_place(key, &mut random);
-        self.learn(&points, &mut random)
+        self.learn(&points, |_| true, &mut random)
     }
 
     /// Points on the surfaces of a place: rays against its main direction find them. Where there are none, points in its
@@ -91,12 +91,13 @@ impl World<'_> {
         points
     }
 
-    /// Shares for these points, from rays of their own.
-    pub fn learn(&self, points: &[Receiver], random: &mut Random) -> Shares {
+    /// Shares for these points, from rays of their own. Groups that are not `counted` get none.
+    pub fn learn(&self, points: &[Receiver], counted: impl Fn(usize) -> bool, random: &mut Random) -> Shares {
         let groups = self.emitters.groups();
         let mean =
             |g| points.iter().map(|p| f64::from(self.emitters.importance(g, p))).sum::<f64>() / points.len() as f64;
-        let expected: Vec<f64> = (0..groups).map(mean).collect();
+        let expected: Vec<f64> = (0..groups).map(|g| if counted(g) { mean(g) } else { 0.0 }).collect();
+        let even = 1.0 / (0..groups).filter(|&g| counted(g)).count().max(1) as f64;
         let mut ranked: Vec<usize> = (0..groups).filter(|&g| expected[g] > 0.0).collect();
         ranked.sort_by(|&a, &b| expected[b].total_cmp(&expected[a]).then(a.cmp(&b)));
         ranked.truncate(TESTED);
@@ -125,7 +126,7 @@ impl World<'_> {
         let defensive = if lit { DEFENSIVE } else { 1.0 };
         let weight = |g: usize| {
             let of = |value: f64, sum: f64| if sum > 0.0 && sum.is_finite() { value / sum } else { 0.0 };
-            let even = 1.0 / groups as f64;
+            let even = if counted(g) { even } else { 0.0 };
             (1.0 - defensive) * of(learnt[g], learnt_sum) + 0.5 * defensive * (of(expected[g], expected_sum) + even)
         };
         let weights: Vec<f64> = (0..groups).map(weight).collect();
@@ -140,7 +141,7 @@ impl World<'_> {
         let sample = self.emitters.sample_group(self.scene, group, receiver, bits)?;
         let light = luminance(sample.radiance) * receiver.cosine(sample.direction);
         let arrives = light > 0.0 && self.reaches(receiver.position, &sample, random.bits());
-        let by_cosine = density_of_test(receiver, sample.direction);
+        let by_cosine = if sample.is_punctual() { 0.0 } else { density_of_test(receiver, sample.direction) };
         arrives.then_some(Found { group, light, in_group: sample.density, by_cosine })
     }
 

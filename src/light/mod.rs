@@ -5,6 +5,7 @@ pub mod bsdf;
 pub mod contact;
 pub mod emitters;
 pub mod ggx;
+pub mod incident;
 pub mod lambert;
 pub mod learn;
 pub mod path;
@@ -41,7 +42,7 @@ impl<'s> World<'s> {
         Ok(World {
             scene,
             tracer,
-            emitters: Emitters::new(scene),
+            emitters: Emitters::new(scene, punctual_scale),
             surfaces: SurfaceTable::new(scene),
             places: Places::new(scene),
             light_contacts: Contacts::of_lights(scene),

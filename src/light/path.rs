@@ -14,7 +14,7 @@ use super::World;
 use super::bsdf::{Bsdf, ReflectionModel};
 use super::emitters::receiver::Receiver;
 use super::emitters::shares::Shares;
-use super::punctual::{Incident, incident};
+use super::incident::{Incident, incident};
 use super::sampled::RayCount;
 use super::surface::SurfacePoint;
 use crate::math::blocks::BlockSample;
@@ -228,7 +228,9 @@ impl World<'_> {
         let bits = std::array::from_fn(|_| numbers.bits());
         let sample = self.emitters.sample(self.scene, shares, receiver, bits)?;
         let cosine = receiver.cosine(sample.direction);
-        if cosine <= 0.0 || sample.radiance == Vec3::ZERO {
+        // Direct light of punctual lights is not asked for at the first vertex.
+        let is_direct = index == 0 && sample.is_punctual();
+        if cosine <= 0.0 || sample.radiance == Vec3::ZERO || is_direct {
             return None;
         }
         rays.shadow += 1;
@@ -237,7 +239,7 @@ impl World<'_> {
         }
         let density = sample.density * emitter_rays;
         let weight = match settings.strategy {
-            Strategy::Mis => power_heuristic(density, bsdf.density(sample.direction, cosine)),
+            Strategy::Mis if !sample.is_punctual() => power_heuristic(density, bsdf.density(sample.direction, cosine)),
             _ => 1.0,
         };
         Some((sample.direction, cosine, sample.radiance * (weight / density)))
@@ -255,7 +257,8 @@ impl World<'_> {
         rays: &mut RayCount,
     ) -> Vec3 {
         let lights = &self.scene.lights;
-        if lights.is_empty() {
+        // Many are sampled as emitters.
+        if lights.is_empty() || self.emitters.has_lamps() {
             return Vec3::ZERO;
         }
         numbers.seek(vertex * PAIRS_PER_VERTEX + PAIR_PUNCTUAL);

@@ -7,9 +7,9 @@
 use glam::{Vec2, Vec3};
 
 use super::World;
-use super::emitters::LightSample;
 use super::emitters::receiver::Receiver;
 use super::emitters::shares::Shares;
+use super::emitters::{LightSample, Origin};
 use super::surface::SurfacePoint;
 use crate::math::random::{KroneckerSequence, Random};
 use crate::math::sampling::{cosine_hemisphere, cosine_hemisphere_density};
@@ -43,11 +43,11 @@ pub struct Emission {
 impl World<'_> {
     /// Whether the light of `sample` reaches `origin`.
     pub fn reaches(&self, origin: Vec3, sample: &LightSample, salt: u32) -> bool {
-        let ray = match sample.target {
-            Some(target) => Ray::segment(origin, target, salt),
-            None => Ray::new(origin, sample.direction, salt),
-        };
-        !self.tracer.occluded(ray)
+        match sample.origin {
+            Origin::Surface(target) => !self.tracer.occluded(Ray::segment(origin, target, salt)),
+            Origin::Sky => !self.tracer.occluded(Ray::new(origin, sample.direction, salt)),
+            Origin::Punctual { index, incident } => self.light_reaches(index, &incident, origin, salt),
+        }
     }
 
     /// One estimate of the irradiance from emitters at a surface with shading normal `normal`, W·m⁻², from this many
@@ -103,8 +103,8 @@ impl World<'_> {
             }
             rays.shadow += 1;
             if self.reaches(receiver.position, &sample, bits[0]) {
-                let density = counts[0] * cosine_hemisphere_density(cosine) + counts[1] * sample.density;
-                sum += sample.radiance * (cosine / density);
+                let of_cosine = if sample.is_punctual() { 0.0 } else { counts[0] * cosine_hemisphere_density(cosine) };
+                sum += sample.radiance * (cosine / (of_cosine + counts[1] * sample.density));
             }
         }
         sum

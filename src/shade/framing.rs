@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::light::World;
-use crate::light::punctual::incident;
+use crate::light::incident::incident;
 use crate::math::fibonacci;
 use crate::scene::Camera;
 use crate::trace::Ray;

@@ -1,6 +1,6 @@
-//! Sampling of emissive triangles and of the sky.
+//! Sampling of emissive triangles, of the sky, and of punctual lights where there are many.
 //!
-//! Emitters come in groups: subtrees of a [`tree`] over emissive triangles, and bins of the [`sky`]. A [`Shares`] says how
+//! Emitters come in groups: subtrees of a [`tree`] over emissive triangles, of another over [`lamps`], and bins of the [`sky`]. A [`Shares`] says how
 //! often a place draws from each group. Within a group the tree chooses a triangle by what it may send to the point, and
 //! points on it are uniform by area; texels of a sky map are chosen in proportion to their power.
 //!
@@ -8,6 +8,7 @@
 //! given ray. Both stand here together.
 
 mod cone;
+mod lamps;
 pub mod receiver;
 pub mod shares;
 mod sky;
@@ -16,11 +17,13 @@ mod triangle;
 
 use glam::{Vec2, Vec3};
 
+use self::lamps::Lamps;
 use self::receiver::Receiver;
 use self::shares::Shares;
-use self::sky::Sky;
+use self::sky::{Sky, SkySample};
 use self::tree::LightTree;
 use self::triangle::Pieces;
+use super::incident::{Incident, incident};
 use crate::math::random::unit_from_bits;
 use crate::math::sampling::triangle_barycentric;
 use crate::scene::Scene;
@@ -31,35 +34,70 @@ use crate::trace::Hit;
 pub struct LightSample {
     /// Unit.
     pub direction: Vec3,
-    /// End of the shadow segment. `None` for the sky.
-    pub target: Option<Vec3>,
-    /// Radiance emitted towards the point × the emitter's opacity, W·m⁻²·sr⁻¹.
+    pub origin: Origin,
+    /// Radiance emitted towards the point × the emitter's opacity, W·m⁻²·sr⁻¹; of a punctual light irradiance, W·m⁻².
     pub radiance: Vec3,
-    /// Density with which this direction is drawn, sr⁻¹.
+    /// Density with which this direction is drawn, sr⁻¹; of a punctual light the probability.
     pub density: f32,
+}
+
+/// What a sample comes from.
+#[derive(Debug, Clone, Copy)]
+pub enum Origin {
+    Sky,
+    /// The end of the shadow segment.
+    Surface(Vec3),
+    /// No ray finds it.
+    Punctual {
+        index: usize,
+        incident: Incident,
+    },
+}
+
+impl LightSample {
+    pub fn is_punctual(&self) -> bool {
+        matches!(self.origin, Origin::Punctual { .. })
+    }
 }
 
 /// The emissive triangles and the sky, prepared for sampling.
 pub struct Emitters {
     pieces: Pieces,
     tree: LightTree,
+    lamps: Lamps,
     sky: Option<Sky>,
-    /// Box around all emissive triangles. Its lower corner lies above its upper corner if no triangle emits.
+    punctual_scale: f32,
+    /// Box around all emissive triangles and lamps. Its lower corner lies above its upper corner if there are none.
     bounds: (Vec3, Vec3),
 }
 
+/// The kind of a group, and its number within it.
+enum Group<'e> {
+    Triangles,
+    Lamps(usize),
+    Sky(&'e Sky, usize),
+}
+
 impl Emitters {
-    pub fn new(scene: &Scene) -> Emitters {
+    /// `punctual_scale` is the factor on all punctual lights.
+    pub fn new(scene: &Scene, punctual_scale: f32) -> Emitters {
         let pieces = Pieces::new(scene);
+        let lamps = Lamps::new(&scene.lights);
+        let placed = || lamps.places(&scene.lights);
         let boxes = || pieces.bounds.iter();
-        let low = boxes().map(|b| b.low).fold(Vec3::INFINITY, Vec3::min);
-        let high = boxes().map(|b| b.high).fold(Vec3::NEG_INFINITY, Vec3::max);
-        let tree = LightTree::new(&pieces.bounds);
-        Emitters { tree, pieces, sky: Sky::new(&scene.environment), bounds: (low, high) }
+        let low = boxes().map(|b| b.low).chain(placed()).fold(Vec3::INFINITY, Vec3::min);
+        let high = boxes().map(|b| b.high).chain(placed()).fold(Vec3::NEG_INFINITY, Vec3::max);
+        let (tree, sky) = (LightTree::new(&pieces.bounds), Sky::new(&scene.environment));
+        Emitters { bounds: (low, high), tree, pieces, lamps, sky, punctual_scale }
     }
 
     pub fn is_empty(&self) -> bool {
         self.groups() == 0
+    }
+
+    /// Whether there are emitters that rays can find.
+    pub fn has_radiance(&self) -> bool {
+        self.tree.groups() > 0 || self.sky.is_some()
     }
 
     /// Number of emissive triangles.
@@ -71,9 +109,28 @@ impl Emitters {
         self.sky.is_some()
     }
 
-    /// Number of groups: those of triangles, then those of the sky.
+    /// Whether punctual lights are among the emitters. Else they are summed one by one.
+    pub fn has_lamps(&self) -> bool {
+        self.lamps.groups() > 0
+    }
+
+    /// Number of groups: those of triangles, of lamps, of the sky.
     pub fn groups(&self) -> usize {
-        self.tree.groups() + self.sky.as_ref().map_or(0, Sky::bins)
+        self.tree.groups() + self.lamps.groups() + self.sky.as_ref().map_or(0, Sky::bins)
+    }
+
+    #[inline]
+    fn kind_of(&self, group: usize) -> Group<'_> {
+        let Some(group) = group.checked_sub(self.tree.groups()) else { return Group::Triangles };
+        match (group.checked_sub(self.lamps.groups()), &self.sky) {
+            (Some(bin), Some(sky)) => Group::Sky(sky, bin),
+            _ => Group::Lamps(group),
+        }
+    }
+
+    /// Whether rays can find the emitters of a group.
+    pub fn is_found_by_rays(&self, group: usize) -> bool {
+        !matches!(self.kind_of(group), Group::Lamps(_))
     }
 
     /// Whether every emitter lies behind the plane through `point` with this normal. No sample can then bring light.
@@ -82,20 +139,21 @@ impl Emitters {
         let foremost = Vec3::select(normal.cmpge(Vec3::ZERO), high, low);
         // Without triangles the left side is NaN, so the comparison is false.
         let any_in_front = (foremost - point).dot(normal) > 0.0;
-        self.sky.is_none() && !any_in_front
+        self.sky.is_none() && !self.lamps.has_directional() && !any_in_front
     }
 
     /// Whether the only emitter is a sky of constant radiance. Cosine-distributed rays are then the best samples.
     pub fn is_uniform_sky(&self) -> bool {
-        self.pieces.all.is_empty() && self.sky.as_ref().is_some_and(Sky::is_uniform)
+        self.pieces.all.is_empty() && !self.has_lamps() && self.sky.as_ref().is_some_and(Sky::is_uniform)
     }
 
     /// Luminance of the irradiance that a group may send to the receiver if nothing occludes it: an estimate, and 0 only
     /// where it sends none.
     pub fn importance(&self, group: usize, receiver: &Receiver) -> f32 {
-        match (group.checked_sub(self.tree.groups()), &self.sky) {
-            (Some(bin), Some(sky)) => sky.importance(bin, receiver),
-            _ => self.tree.importance(group, receiver),
+        match self.kind_of(group) {
+            Group::Triangles => self.tree.importance(group, receiver),
+            Group::Lamps(group) => self.lamps.importance(group, receiver),
+            Group::Sky(sky, bin) => sky.importance(bin, receiver),
         }
     }
 
@@ -118,19 +176,29 @@ impl Emitters {
         [spare, word, u, v]: [u32; 4],
     ) -> Option<LightSample> {
         let place = Vec2::new(unit_from_bits(u), unit_from_bits(v));
-        if let (Some(bin), Some(sky)) = (group.checked_sub(self.tree.groups()), &self.sky) {
-            // The lowest 8 bits of three words, which numbers of 24 bits leave over.
-            let second = spare << 24 | (u & 0xFF) << 16 | (v & 0xFF) << 8;
-            let found = sky.sample(&scene.environment, bin, [word, second], place)?;
-            return Some(LightSample {
-                direction: found.direction,
-                target: None,
-                radiance: found.radiance,
-                density: found.density,
-            });
-        }
         // 32 bits, all below 1.
         let number = f64::from(word) / 2f64.powi(32);
+        match self.kind_of(group) {
+            Group::Sky(sky, bin) => {
+                // The lowest 8 bits of three words, which numbers of 24 bits leave over.
+                let second = spare << 24 | (u & 0xFF) << 16 | (v & 0xFF) << 8;
+                let SkySample { direction, radiance, density } =
+                    sky.sample(&scene.environment, bin, [word, second], place)?;
+                return Some(LightSample { direction, origin: Origin::Sky, radiance, density });
+            }
+            Group::Lamps(group) => {
+                let (index, density) = self.lamps.draw(group, receiver, number)?;
+                let incident = incident(&scene.lights[index], receiver.position)?;
+                let origin = Origin::Punctual { index, incident };
+                return Some(LightSample {
+                    direction: incident.direction,
+                    origin,
+                    radiance: incident.irradiance * self.punctual_scale,
+                    density,
+                });
+            }
+            Group::Triangles => {}
+        }
         let (piece, probability) = self.tree.draw(group, receiver, number)?;
         let triangle = &self.pieces.all[piece];
         let within = triangle_barycentric(place);
@@ -148,7 +216,8 @@ impl Emitters {
             return None;
         }
         let target = triangle.shadow_target(receiver.position, on_triangle, cosine);
-        Some(LightSample { direction, target: Some(target), radiance: triangle.radiance(scene, within), density })
+        let radiance = triangle.radiance(scene, within);
+        Some(LightSample { direction, origin: Origin::Surface(target), radiance, density })
     }
 
     /// Density, sr⁻¹, with which [`Self::sample`] draws the unit `direction` from `receiver` to this hit.
@@ -180,7 +249,7 @@ impl Emitters {
     #[inline]
     pub fn sky_group_along(&self, scene: &Scene, direction: Vec3) -> Option<(Vec3, usize, f32)> {
         let (radiance, bin, density) = self.sky.as_ref()?.along(&scene.environment, direction);
-        Some((radiance, self.tree.groups() + bin, density))
+        Some((radiance, self.tree.groups() + self.lamps.groups() + bin, density))
     }
 }
 

@@ -245,7 +245,7 @@ fn reciprocal_densities_sum_to_solid_angles() {
     // the density that it claims to be, and integrates to 1 over all that is drawn.
     for environment in [Environment::None, sky()] {
         let scene = scene(&[CEILING, SCREEN, TURNED], environment);
-        let emitters = Emitters::new(&scene);
+        let emitters = Emitters::new(&scene, 1.0);
         let mut random = random(2);
         let [mut ceiling, mut screen, mut turned, mut sky] = [Mean::default(); 4];
         for _ in 0..DRAWS {
@@ -253,10 +253,10 @@ fn reciprocal_densities_sum_to_solid_angles() {
             let of =
                 |is: &dyn Fn(&LightSample) -> bool| sample.as_ref().filter(|s| is(s)).map_or(0.0, |s| 1.0 / s.density);
             let radiance = |lamp: Lamp| Vec3::from_array(lamp.radiance);
-            ceiling.add(of(&|s| s.target.is_some() && s.radiance == radiance(CEILING)));
-            screen.add(of(&|s| s.target.is_some() && s.radiance == radiance(SCREEN)));
-            turned.add(of(&|s| s.target.is_some() && s.radiance == radiance(TURNED)));
-            sky.add(of(&|s| s.target.is_none()));
+            ceiling.add(of(&|s| matches!(s.origin, Origin::Surface(_)) && s.radiance == radiance(CEILING)));
+            screen.add(of(&|s| matches!(s.origin, Origin::Surface(_)) && s.radiance == radiance(SCREEN)));
+            turned.add(of(&|s| matches!(s.origin, Origin::Surface(_)) && s.radiance == radiance(TURNED)));
+            sky.add(of(&|s| matches!(s.origin, Origin::Sky)));
             assert!(sample.is_none_or(|s| s.direction.is_normalized()));
         }
         ceiling.assert_is(solid_angle(&CEILING), ROUNDING, "ceiling");
@@ -276,9 +276,10 @@ fn both_techniques_state_the_same_density() {
         let mut random = random(3);
         for _ in 0..2_000 {
             let Some(sample) = emitters.sample(&scene, &shares, &ORIGIN, bits(&mut random)) else { continue };
-            let density = match sample.target {
-                None => emitters.sky_along(&scene, &shares, sample.direction).1,
-                Some(target) => {
+            let density = match sample.origin {
+                Origin::Punctual { .. } => unreachable!("the scene has no punctual light"),
+                Origin::Sky => emitters.sky_along(&scene, &shares, sample.direction).1,
+                Origin::Surface(target) => {
                     let hit = world.tracer.closest(Ray::new(Vec3::ZERO, sample.direction, 0)).expect("the lamp itself");
                     // The shadow segment ends just short of the lamp.
                     assert!(target.length() < hit.t && target.length() > 0.999 * hit.t, "{target} for {}", hit.t);
@@ -305,7 +306,7 @@ fn map() -> EnvironmentMap {
 fn texels_of_the_sky_are_drawn_by_power() {
     for lamps in [&[][..], &[TURNED][..]] {
         let scene = scene(lamps, Environment::Map(map()));
-        let emitters = Emitters::new(&scene);
+        let emitters = Emitters::new(&scene, 1.0);
         let shares = even(&emitters);
         assert_eq!(emitters.groups(), 32 + lamps.len());
         let edge = |row: usize| (row as f64 / 8.0 * std::f64::consts::PI).cos();
@@ -316,7 +317,9 @@ fn texels_of_the_sky_are_drawn_by_power() {
         let mut random = random(4);
         let (mut drawn, mut solid_angles) = ([Mean::default(); 128], [Mean::default(); 128]);
         for _ in 0..DRAWS {
-            let sample = emitters.sample(&scene, &shares, &ORIGIN, bits(&mut random)).filter(|s| s.target.is_none());
+            let sample = emitters
+                .sample(&scene, &shares, &ORIGIN, bits(&mut random))
+                .filter(|s| matches!(s.origin, Origin::Sky));
             let found = sample.map(|sample| {
                 let texel = map().texel_index(sample.direction);
                 assert_eq!(sample.radiance, map().texels[texel]);
@@ -348,7 +351,7 @@ fn texels_of_the_sky_are_drawn_by_power() {
 
 /// Mean irradiance at the origin from samples towards emitters alone, green channel.
 fn sampled_irradiance(scene: &Scene, normal: Vec3, geometric_normal: Vec3) -> Mean {
-    let emitters = Emitters::new(scene);
+    let emitters = Emitters::new(scene, 1.0);
     let shares = even(&emitters);
     let receiver = Receiver { position: Vec3::ZERO, normal, geometric_normal };
     let mut random = random(5);
@@ -441,7 +444,7 @@ fn textured_lamps_emit_what_the_texture_says() {
 #[test]
 fn what_lies_behind_is_known() {
     let only_lamps = scene(&[CEILING, SCREEN], Environment::None);
-    let emitters = Emitters::new(&only_lamps);
+    let emitters = Emitters::new(&only_lamps, 1.0);
     assert!(!emitters.all_behind(Vec3::ZERO, Vec3::Y));
     assert!(emitters.all_behind(Vec3::ZERO, Vec3::NEG_Y));
     assert!(emitters.all_behind(Vec3::new(0.0, 2.6, 0.0), Vec3::Y));
@@ -458,12 +461,12 @@ fn what_lies_behind_is_known() {
     assert!(!draw(Vec3::new(-3.0, 3.0, 0.0), &mut random).is_empty(), "the other side of the screen");
     // No lamps: all is behind unless there is a sky.
     let empty = scene(&[DARK], Environment::None);
-    let emitters = Emitters::new(&empty);
+    let emitters = Emitters::new(&empty, 1.0);
     assert!(emitters.is_empty() && emitters.all_behind(Vec3::ZERO, Vec3::Y));
     let open = scene(&[DARK], sky());
-    let emitters = Emitters::new(&open);
+    let emitters = Emitters::new(&open, 1.0);
     assert!(emitters.is_uniform_sky() && !emitters.all_behind(Vec3::ZERO, Vec3::NEG_Y));
-    assert!(Emitters::new(&scene(&[DARK], Environment::Constant(Vec3::ZERO))).is_empty(), "a black sky is none");
+    assert!(Emitters::new(&scene(&[DARK], Environment::Constant(Vec3::ZERO)), 1.0).is_empty(), "a black sky is none");
 }
 
 /// A lamp of 64 × 64 texels of which one is lit is as good as a lamp of that texel's shape.
@@ -490,9 +493,10 @@ fn one_bright_texel_is_a_small_lamp() {
         let expected: f64 = halves.map(|corners| form_factor(&Lamp { corners, ..CEILING }, Vec3::Y)).iter().sum();
         let mean = sampled_irradiance(&scene, Vec3::Y, Vec3::Y);
         mean.assert_is(expected, ROUNDING, "the texel");
-        // Pieces reach a texel beyond it on every side, as interpolation does: 1 of 9 to 25 draws meets it, not 1 of 2048.
+        // Every piece has the same share here. Those near the texel are as small as it, so some tens of draws meet it once;
+        // of draws even over the lamp it would be one of 2048.
         let variance = mean.squares / mean.count / expected.powi(2);
-        assert!(variance < 50.0, "second moment {variance} × the square of the mean");
+        assert!(variance < 200.0, "second moment {variance} × the square of the mean");
     }
 }
 
@@ -504,7 +508,7 @@ fn places_learn_what_they_see() {
     let scene = scene(&[CEILING, SCREEN, wall], Environment::None);
     let world = World::new(&scene, 1.0, 0.999).expect("Embree");
     let receiver = Receiver { normal: Vec3::Y, geometric_normal: Vec3::Y, ..ORIGIN };
-    let shares = world.learn(&[receiver], &mut random(8));
+    let shares = world.learn(&[receiver], |_| true, &mut random(8));
     let group =
         |t| world.emitters.pieces.at(TriangleIndex(t), Vec2::splat(0.2)).map(|(p, _)| world.emitters.tree.group_of(p));
     let (ceiling, screen) = (group(0).expect("it emits"), group(1).expect("it emits"));

@@ -127,12 +127,17 @@ impl Capture<'_, '_> {
     fn centre(&self, index: usize, position: Vec3) -> Option<Centre> {
         // The capture's own rays are even denser samples of a sky of one radiance.
         let samples = self.settings.probe_emitter_samples;
-        if samples == 0 || !self.samples_emitters() || self.world.emitters.is_uniform_sky() {
+        if samples == 0
+            || !self.samples_emitters()
+            || !self.world.emitters.has_radiance()
+            || self.world.emitters.is_uniform_sky()
+        {
             return None;
         }
         let receiver = Receiver::in_space(position);
         let mut random = Random::new(self.seed, Purpose::Places, index as u64, 1);
-        let shares = self.world.learn(&[receiver], &mut random);
+        let emitters = &self.world.emitters;
+        let shares = self.world.learn(&[receiver], |group| emitters.is_found_by_rays(group), &mut random);
         let draws = (0..self.world.emitters.groups()).map(|group| {
             let expected = samples as f32 * shares.of(group);
             let count = (expected + random.uniform()) as u32;
@@ -241,7 +246,11 @@ impl Capture<'_, '_> {
     ) {
         let world = self.world;
         let normal = surface.shading_normal;
-        let (punctual, shadow_rays) = world.punctual_irradiance(surface, normal, random.bits());
+        // Many lights are sampled as emitters.
+        let (punctual, shadow_rays) = match samples {
+            Some(_) if world.emitters.has_lamps() => (Vec3::ZERO, 0),
+            _ => world.punctual_irradiance(surface, normal, random.bits()),
+        };
         out.rays.shadow += u64::from(shadow_rays);
         let sampled = match samples {
             Some(samples) => world.emitter_irradiance(surface, normal, samples, random, &mut out.rays),

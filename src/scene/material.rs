@@ -42,6 +42,18 @@ pub struct Material {
     pub unlit: bool,
 }
 
+impl Material {
+    /// The texture slots with the names that they have in glTF.
+    pub fn textures(&self) -> [(&'static str, Option<TextureRef>); 4] {
+        [
+            ("baseColorTexture", self.base_color_texture),
+            ("metallicRoughnessTexture", self.metallic_roughness_texture),
+            ("emissiveTexture", self.emission_texture),
+            ("normalTexture", self.normal_texture),
+        ]
+    }
+}
+
 /// A texture as one material slot uses it.
 #[derive(Debug, Clone, Copy)]
 pub struct TextureRef {

@@ -6,6 +6,8 @@ mod common;
 mod damage;
 mod distance;
 mod geometry;
+mod lights;
+mod looked_at;
 mod materials;
 mod promises;
 mod skies;

@@ -203,8 +203,9 @@ pub struct ReferenceArgs {
     /// they are, for a quick look without a known error.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=MAX_SPP))]
     pub spp: u32,
-    /// Reflection: `lambert` as in probes, every surface diffuse; `gltf` with the glossy lobes of metallic-roughness
-    /// materials, in a layer `glossy` too.
+    /// Reflection: `lambert` as in probes, every surface diffuse; `gltf` as glTF 2.0 defines metallic-roughness materials
+    /// (appendix B: GGX with Smith's shadowing over a diffuse base), with a layer `glossy` too. Only where the appendix
+    /// would reflect more light than arrives, its base is darker.
     #[arg(long, value_enum, default_value = "lambert")]
     pub transport: TransportName,
     #[command(flatten)]

@@ -1,13 +1,17 @@
 //! Light: the radiance that surfaces emit and reflect, and the irradiance that arrives at them. `bake`, `render` and
 //! `reference` all use these functions.
 
+#[cfg(test)]
+mod appendix_b;
 pub mod bsdf;
 pub mod contact;
 pub mod emitters;
 pub mod ggx;
 pub mod incident;
 pub mod lambert;
+pub mod layered;
 pub mod learn;
+pub mod lobe_albedo;
 pub mod path;
 pub mod places;
 pub mod punctual;

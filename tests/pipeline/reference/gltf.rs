@@ -26,8 +26,7 @@ fn gltf(spp: u32, strategy: Strategy) -> ReferenceSettings {
 
 #[test]
 fn mirrors_show_the_sky() {
-    // Roughness 0, metal: radiance F·L with F = F0 but for grazing angles, less Schlick's shadowing by α/2 = 5e-4 over
-    // cosines of about 0.7, twice.
+    // Roughness 0, metal: radiance F·L with F = F0 but for grazing angles. Shadowing takes α²·tan²/4 = 2.5e-7.
     let folder = Folder::new();
     let mut gltf_file = Gltf::new();
     let plane = quad([-500.0, 0.0, -500.0], [0.0, 0.0, 1000.0], [1000.0, 0.0, 0.0], 1);
@@ -47,6 +46,36 @@ fn mirrors_show_the_sky() {
     Check::indirect(&reference).against_constant([PI, 2.0 * PI, 0.5 * PI], "irradiance on a mirror");
     let glossy = reference.image.layer("glossy").expect("a glossy layer");
     assert!(glossy.iter().zip(reference.beauty()).all(|(g, b)| g.abs_diff_eq(*b, 1e-5)), "all of it is glossy");
+}
+
+#[test]
+fn white_surfaces_under_a_white_sky_show_their_directional_albedo() {
+    // baseColor, metallic, roughness, n·v; and the directional albedo of glTF's appendix B by quadrature in f64. F0 = 1
+    // stands for 0.999, to which `albedo_max` clamps it. At none of these does the appendix exceed 1, for any light.
+    let cases = [
+        (1.0, 1.0, 0.5, 0.2, 0.8307),
+        (1.0, 1.0, 0.5, 0.5, 0.8543),
+        (1.0, 1.0, 0.3, 0.2, 0.9115),
+        (1.0, 1.0, 1.0, 0.5, 0.4087),
+        (0.8, 0.0, 0.5, 0.2, 0.8798),
+        (0.8, 0.0, 0.5, 0.5, 0.8197),
+    ];
+    for (color, metallic, roughness, cosine, albedo) in cases {
+        let folder = Folder::new();
+        let mut gltf_file = Gltf::new();
+        let plane = quad([-500.0, 0.0, -500.0], [0.0, 0.0, 1000.0], [1000.0, 0.0, 0.0], 1);
+        add(&mut gltf_file, &plane, material([color; 3], metallic, roughness));
+        let mut scene = load(&save(gltf_file, &folder, "white"));
+        scene.environment = Environment::Constant(Vec3::ONE);
+        let world = world(&scene);
+        let eye = [0.0, 2.0 * cosine, 2.0 * (1.0f64 - cosine * cosine).sqrt()];
+        let camera = camera(&scene, eye, [0.0; 3], 0.5);
+        let reference = small(&world, &camera, &gltf(1024, Strategy::Mis));
+        let variance = reference.beauty_variance().expect("two blocks");
+        // The picture spans half a degree, over which the albedo changes by up to 1e-3, symmetrically about the middle.
+        let what = format!("{color} {metallic} {roughness} {cosine}");
+        Check { found: reference.beauty(), variance, floor: 1e-3 }.against_constant([albedo; 3], &what);
+    }
 }
 
 /// Walls of all kinds, a lamp, a point light.

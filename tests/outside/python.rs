@@ -38,7 +38,7 @@ fn points(scene: &Scene, count: u32) -> Vec<Asked> {
     let mut point = |i: u32| {
         let mut uniform = || random.uniform();
         let bent = uniform_sphere(Vec2::new(uniform(), uniform()));
-        let (position, facing) = if i % 3 == 0 {
+        let (position, facing) = if i.is_multiple_of(3) {
             let triangle = TriangleIndex((uniform() * scene.mesh.triangles.len() as f32) as u32);
             let place = triangle_barycentric(Vec2::new(uniform(), uniform()));
             let side = if uniform() < 0.5 { 1.0 } else { -1.0 };

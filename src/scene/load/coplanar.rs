@@ -94,7 +94,7 @@ fn precedes(mesh: &Mesh, materials: &[Material], a: TriangleIndex, b: TriangleIn
     };
     let corners = |t: TriangleIndex| {
         let mut corners = mesh.corners(t).map(|c| c.to_array());
-        corners.sort_by(|p, q| compare(p, q));
+        corners.sort_by(compare);
         corners
     };
     let by_corners = || {

@@ -99,6 +99,7 @@ fn unread_extensions_name_the_way_out() {
         ("EXT_meshopt_compression", "gltfpack"),
         ("KHR_texture_basisu", "ktxdecompress"),
         ("EXT_texture_webp", "gltf-transform png"),
+        ("EXT_lights_image_based", "--env"),
         ("VENDOR_unheard_of", "without it"),
     ] {
         let mut gltf = Gltf::of_triangles(&TRIANGLE);
@@ -118,6 +119,33 @@ fn unread_extensions_name_the_way_out() {
     // A texture on a factor of zero is never read.
     gltf.json["materials"][0]["emissiveFactor"] = json!([0, 0, 0]);
     assert!(loaded(&gltf).textures.is_empty());
+}
+
+#[test]
+fn extensions_that_nobody_sees_may_be_required() {
+    for extension in [
+        "KHR_interactivity",
+        "KHR_physics_rigid_bodies",
+        "KHR_implicit_shapes",
+        "KHR_node_hoverability",
+        "KHR_node_selectability",
+        "OMI_physics_body",
+        "KHR_audio_emitter",
+        "KHR_xmp_json_ld",
+    ] {
+        let mut gltf = Gltf::of_triangles(&TRIANGLE);
+        let silent = loaded(&gltf).warnings;
+        gltf.json["extensionsRequired"] = json!([extension]);
+        gltf.json["nodes"][0]["extensions"] = json!({ extension: { "hoverable": false, "shape": 99 } });
+        assert_eq!(loaded(&gltf).warnings, silent, "{extension}");
+    }
+    // What is seen is not ignored: a hidden node, and a sky.
+    let mut gltf = Gltf::of_triangles(&TRIANGLE);
+    gltf.root(json!({ "mesh": 0, "extensions": { "KHR_node_visibility": { "visible": false } } }));
+    gltf.json["extensionsRequired"] = json!(["KHR_node_visibility"]);
+    assert_eq!(loaded(&gltf).mesh.triangles.len(), 1);
+    gltf.json["extensionsRequired"] = json!(["OMI_environment_sky"]);
+    assert!(error(&gltf).contains("OMI_environment_sky"));
 }
 
 #[test]

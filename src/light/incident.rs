@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use crate::scene::light::LIGHT_MAX;
 use crate::scene::{LightKind, PunctualLight};
 
 /// Least difference of the cosines of inner and outer cone, from the formula of the extension. It avoids a division by
@@ -15,7 +16,7 @@ pub struct Incident {
     pub direction: Vec3,
     /// Distance to the light, metres. Infinite for directional lights.
     pub distance: f32,
-    /// Irradiance on a surface that faces the light, W·m⁻².
+    /// Irradiance on a surface that faces the light, W·m⁻², at most [`LIGHT_MAX`].
     pub irradiance: Vec3,
 }
 
@@ -36,17 +37,23 @@ pub fn incident(light: &PunctualLight, position: Vec3) -> Option<Incident> {
         }
         LightKind::Point { position, range_m } => {
             let (direction, distance, falloff) = from(position, range_m)?;
-            Some(Incident { direction, distance, irradiance: light.intensity * falloff })
+            Some(Incident { direction, distance, irradiance: bounded(light.intensity * falloff) })
         }
         LightKind::Spot { position, direction: axis, range_m, inner_cone_rad, outer_cone_rad } => {
             let (direction, distance, falloff) = from(position, range_m)?;
             let (cos_inner, cos_outer) = (inner_cone_rad.cos(), outer_cone_rad.cos());
             let scale = 1.0 / (cos_inner - cos_outer).max(MIN_CONE_WIDTH);
             let cone = ((axis.dot(-direction) - cos_outer) * scale).clamp(0.0, 1.0);
-            let irradiance = light.intensity * (falloff * cone * cone);
+            let irradiance = bounded(light.intensity * (falloff * cone * cone));
             (cone > 0.0).then_some(Incident { direction, distance, irradiance })
         }
     }
+}
+
+/// Light that is at most [`LIGHT_MAX`] per channel: near a light the inverse square of the distance has no bound.
+#[inline]
+pub fn bounded(light: Vec3) -> Vec3 {
+    light.min(Vec3::splat(LIGHT_MAX))
 }
 
 #[cfg(test)]
@@ -66,6 +73,30 @@ mod tests {
         assert!((at(5.0) - (1.0 - 0.5f32.powi(4)) / 25.0).abs() < 1e-7);
         assert_eq!(at(10.0), 0.0);
         assert_eq!(at(0.0), 0.0);
+    }
+
+    #[test]
+    fn light_has_a_bound_and_cones_of_no_width_light_nothing() {
+        let bright = |kind| PunctualLight { intensity: Vec3::splat(LIGHT_MAX), ..light(kind) };
+        let point = bright(LightKind::Point { position: Vec3::ZERO, range_m: f32::INFINITY });
+        // The squares of these distances are 10⁻³⁸ and, as a denormal number, 10⁻⁴⁴.
+        for distance in [1e-19, 1e-22] {
+            let irradiance = incident(&point, Vec3::X * distance).map_or(Vec3::ZERO, |i| i.irradiance);
+            assert!(irradiance == Vec3::splat(LIGHT_MAX) || irradiance == Vec3::ZERO, "{irradiance}");
+        }
+        let spot = |cone: f32| LightKind::Spot {
+            position: Vec3::ZERO,
+            direction: Vec3::NEG_Z,
+            range_m: f32::INFINITY,
+            inner_cone_rad: cone,
+            outer_cone_rad: cone,
+        };
+        for cone in [0.0, 1e-6, 1e-3] {
+            // 0.01 off the axis lies outside.
+            assert_eq!(incident(&bright(spot(cone)), Vec3::new(0.01, 0.0, -1.0)), None);
+            let irradiance = incident(&bright(spot(cone)), Vec3::NEG_Z).map_or(Vec3::ZERO, |i| i.irradiance);
+            assert!(irradiance.is_finite());
+        }
     }
 
     #[test]

@@ -4,13 +4,13 @@ use glam::Vec3;
 
 use super::World;
 use super::bsdf::Bsdf;
-use super::incident::{Incident, incident};
+use super::incident::{Incident, bounded, incident};
 use super::surface::SurfacePoint;
 use crate::trace::Ray;
 
 impl World<'_> {
-    /// Irradiance with shadows from all punctual lights, W·m⁻², at a surface with this shading normal; and the number
-    /// of shadow rays.
+    /// Irradiance with shadows from all punctual lights, W·m⁻², at most [`LIGHT_MAX`](crate::scene::light::LIGHT_MAX), at a surface with this shading
+    /// normal; and the number of shadow rays.
     pub fn punctual_irradiance(&self, point: &SurfacePoint, normal: Vec3, salt: u32) -> (Vec3, u32) {
         self.punctual_sum(point, normal, salt, |_, cosine| Vec3::splat(cosine))
     }
@@ -58,6 +58,6 @@ impl World<'_> {
                 sum += incident.irradiance * response(incident.direction, cosine);
             }
         }
-        (sum * self.punctual_scale, rays)
+        (bounded(sum * self.punctual_scale), rays)
     }
 }

@@ -2,6 +2,13 @@
 
 use glam::Vec3;
 
+/// Most light that is computed with: radiance, irradiance and intensity per channel. Larger values are clamped to it and
+/// counted.
+///
+/// It lies 8.5 decades below the end of f32, which leaves room for all factors between a light and a stored irradiance:
+/// π, the sum over bounces (10³ at the default largest albedo of 0.999) and `lights.punctual_scale`.
+pub const LIGHT_MAX: f32 = 1e30;
+
 #[derive(Debug, Clone)]
 pub struct PunctualLight {
     pub name: String,

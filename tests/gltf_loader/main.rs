@@ -6,6 +6,7 @@ mod common;
 mod damage;
 mod distance;
 mod geometry;
+mod lights;
 mod materials;
 mod promises;
 mod skies;

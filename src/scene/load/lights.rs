@@ -1,9 +1,10 @@
-//! Punctual lights and cameras at the positions of their nodes. The scale of a node does not affect them.
+//! Punctual lights and cameras at the positions of their nodes. Scale moves them, and turns them only where it mirrors:
+//! see [`Nodes::orientations`].
 
 use std::collections::HashSet;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
-use glam::{DVec3, Mat3, Vec3};
+use glam::{DMat3, DVec3, Mat3, Vec3};
 use gltf::json::extensions::scene::khr_lights_punctual::{Light, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Camera as CameraDefinition, camera::Type as CameraType};
@@ -14,6 +15,7 @@ use super::text::{label, short};
 use super::transform::{Pose, WorldPoint};
 use crate::scene::camera::Projection;
 use crate::scene::error::{RE_EXPORT, SceneError};
+use crate::scene::light::LIGHT_MAX;
 use crate::scene::{Camera, LightKind, PunctualLight};
 
 /// The point to which the scene's positions are relative: landmark + centre.
@@ -48,36 +50,45 @@ pub(super) fn lights(
         if !position.is_finite() {
             return Err(document.invalid(place, "it is infinitely far from the scene", "move it closer"));
         }
+        let direction = (nodes.orientations[index] * DVec3::NEG_Z).normalize_or(DVec3::NEG_Z).as_vec3();
+        let intensity = intensity(document, light, &place, warnings)?;
+        let Some(kind) = kind(document, light, direction, position, &place, warnings)? else { continue };
         let name = node.name.as_deref().or(light.name.as_deref());
-        lights.push(PunctualLight {
-            name: name.map_or_else(|| format!("light {}", lights.len()), short),
-            kind: kind(document, light, &pose, position, &place, warnings)?,
-            intensity: intensity(document, light, &place, warnings)?,
-        });
+        let name = name.map_or_else(|| format!("light {}", lights.len()), short);
+        lights.push(PunctualLight { name, kind, intensity });
     }
     Ok(lights)
 }
 
+/// Colour × intensity. Neither may be negative: each alone becomes 0, because the product of two would be light.
 fn intensity(document: &Document, light: &Light, place: &str, warnings: &mut Vec<String>) -> Result<Vec3, SceneError> {
-    let intensity = Vec3::from_array(light.color) * light.intensity;
-    if !intensity.is_finite() {
-        return Err(document.invalid(place, "its color × intensity is not finite", "correct the light"));
+    let (color, intensity) = (Vec3::from_array(light.color), light.intensity);
+    if !color.is_finite() || !intensity.is_finite() {
+        let what = if color.is_finite() { "intensity" } else { "color" };
+        return Err(document.invalid(place, format!("its {what} is not finite"), "correct the light"));
     }
-    if intensity.min_element() < 0.0 {
-        warnings.push(format!("{place}: negative intensity is set to 0"));
+    if intensity < 0.0 {
+        warnings.push(format!("{place}: its negative intensity {intensity} is set to 0"));
     }
-    Ok(intensity.max(Vec3::ZERO))
+    if color.min_element() < 0.0 {
+        warnings.push(format!("{place}: negative channels of its color {color} are set to 0"));
+    }
+    let light = color.max(Vec3::ZERO) * intensity.max(0.0);
+    if light.max_element() > LIGHT_MAX {
+        warnings.push(format!("{place}: its color × intensity exceeds {LIGHT_MAX:e} and is clamped to that"));
+    }
+    Ok(light.min(Vec3::splat(LIGHT_MAX)))
 }
 
+/// The light's kind, or `None` for a spot light without a cone.
 fn kind(
     document: &Document,
     light: &Light,
-    pose: &Pose,
+    direction: Vec3,
     position: Vec3,
     place: &str,
     warnings: &mut Vec<String>,
-) -> Result<LightKind, SceneError> {
-    let direction = (pose.linear * DVec3::NEG_Z).normalize_or(DVec3::NEG_Z).as_vec3();
+) -> Result<Option<LightKind>, SceneError> {
     let range_m = match light.range {
         Some(range) if range > 0.0 => range,
         Some(range) => {
@@ -86,26 +97,35 @@ fn kind(
         }
         None => f32::INFINITY,
     };
-    match light.type_ {
-        Checked::Valid(Type::Directional) => Ok(LightKind::Directional { direction }),
-        Checked::Valid(Type::Point) => Ok(LightKind::Point { position, range_m }),
-        Checked::Valid(Type::Spot) => {
-            let (inner, outer) = match &light.spot {
-                Some(spot) => (spot.inner_cone_angle, spot.outer_cone_angle),
-                None => (0.0, FRAC_PI_4),
-            };
-            if !inner.is_finite() || !outer.is_finite() || outer <= 0.0 {
-                return Err(document.invalid(place, "its cone angles are not positive numbers", "correct the light"));
-            }
-            let outer_cone_rad = outer.min(FRAC_PI_2);
-            let inner_cone_rad = inner.clamp(0.0, outer_cone_rad);
-            if (inner_cone_rad, outer_cone_rad) != (inner, outer) {
-                warnings.push(format!("{place}: cone angles are clamped to 0 ≤ inner ≤ outer ≤ π/2"));
-            }
-            Ok(LightKind::Spot { position, direction, range_m, inner_cone_rad, outer_cone_rad })
+    let (inner, outer) = match &light.type_ {
+        Checked::Valid(Type::Directional) => return Ok(Some(LightKind::Directional { direction })),
+        Checked::Valid(Type::Point) => return Ok(Some(LightKind::Point { position, range_m })),
+        Checked::Valid(Type::Spot) => match &light.spot {
+            Some(spot) => (spot.inner_cone_angle, spot.outer_cone_angle),
+            None => (0.0, FRAC_PI_4),
+        },
+        Checked::Invalid => {
+            return Err(document.invalid(place, "KHR_lights_punctual does not define its type", RE_EXPORT));
         }
-        Checked::Invalid => Err(document.invalid(place, "KHR_lights_punctual does not define its type", RE_EXPORT)),
+    };
+    if !inner.is_finite() || !outer.is_finite() {
+        let what = if outer.is_finite() { "innerConeAngle" } else { "outerConeAngle" };
+        return Err(document.invalid(place, format!("its {what} is not finite"), "correct the light"));
     }
+    // The extension asks for 0 ≤ inner < outer ≤ π/2. Within a cone of no width no point can be lit.
+    if outer <= 0.0 {
+        warnings.push(format!("{place} is left out: its outerConeAngle is {outer}, but must be greater than 0"));
+        return Ok(None);
+    }
+    let outer_cone_rad = outer.min(FRAC_PI_2);
+    let inner_cone_rad = inner.clamp(0.0, outer_cone_rad);
+    if (inner_cone_rad, outer_cone_rad) != (inner, outer) {
+        warnings.push(format!(
+            "{place}: cone angles {inner} and {outer} are clamped to 0 ≤ inner ≤ outer ≤ π/2: {inner_cone_rad} and \
+             {outer_cone_rad}"
+        ));
+    }
+    Ok(Some(LightKind::Spot { position, direction, range_m, inner_cone_rad, outer_cone_rad }))
 }
 
 /// The cameras of the visible nodes, with unique names. A camera that cannot be used is left out with a warning and is
@@ -124,7 +144,7 @@ pub(super) fn cameras(
         let definition = document.get(&document.cameras, "camera", camera_index, &node_label(document, index))?;
         let pose = nodes.placements[index].relative_to(origin.landmark);
         let position = origin.position(&pose);
-        let frame = frame(&pose).filter(|_| position.is_finite());
+        let frame = frame(&nodes.orientations[index]).filter(|_| position.is_finite());
         let (Some(world_from_camera), Some(projection)) = (frame, projection(definition)) else {
             let place = label("camera", camera_index.value(), definition.name.as_deref());
             warnings.push(format!("{place} is left out: its projection or its node's transform is not valid"));
@@ -148,11 +168,11 @@ fn unique(name: String, taken: &mut HashSet<String>) -> String {
     candidate
 }
 
-/// The node's right, up and back vectors, made orthonormal. `None` if the transform has no view direction or no up
-/// vector.
-fn frame(pose: &Pose) -> Option<Mat3> {
-    let back = pose.linear.z_axis.try_normalize()?;
-    let right = pose.linear.y_axis.try_normalize()?.cross(back).try_normalize()?;
+/// The right, up and back vectors of a view with this orientation, which may mirror. A picture is never mirrored: back
+/// and up are kept, and right follows from them.
+fn frame(orientation: &DMat3) -> Option<Mat3> {
+    let back = orientation.z_axis.try_normalize()?;
+    let right = orientation.y_axis.try_normalize()?.cross(back).try_normalize()?;
     Some(Mat3::from_cols(right.as_vec3(), back.cross(right).as_vec3(), back.as_vec3()))
 }
 
@@ -172,8 +192,6 @@ fn projection(definition: &CameraDefinition) -> Option<Projection> {
 
 #[cfg(test)]
 mod tests {
-    use glam::DMat3;
-
     use super::*;
 
     #[test]
@@ -185,11 +203,11 @@ mod tests {
 
     #[test]
     fn camera_frames_are_right_handed_and_orthonormal() {
-        for linear in [DMat3::IDENTITY, DMat3::from_diagonal(DVec3::new(-2.0, 3.0, 4.0)), DMat3::from_rotation_x(0.3)] {
-            let frame = frame(&Pose { linear, offset: DVec3::ZERO }).expect("a frame");
+        for linear in [DMat3::IDENTITY, DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0)), DMat3::from_rotation_x(0.3)] {
+            let frame = frame(&linear).expect("a frame");
             assert!((frame.determinant() - 1.0).abs() < 1e-6);
             assert!(frame.mul_mat3(&frame.transpose()).abs_diff_eq(Mat3::IDENTITY, 1e-6));
         }
-        assert!(frame(&Pose { linear: DMat3::ZERO, offset: DVec3::ZERO }).is_none());
+        assert!(frame(&DMat3::ZERO).is_none());
     }
 }

@@ -3,16 +3,23 @@
 
 use serde_json::Value;
 
+use glam::DMat3;
 use gltf::json::Node;
 
 use super::document::Document;
 use super::text::label;
-use super::transform::{Local, Placement};
+use super::transform::{Local, Placement, Turn};
 use crate::scene::error::{RE_EXPORT, SceneError};
 
 pub(super) struct Nodes {
     /// World transforms of all nodes of the file. Nodes outside the scene are included, because they can be joints.
     pub placements: Vec<Placement>,
+    /// Orthogonal matrix that turns directions of a light or camera on the node into the world, for all nodes of the
+    /// file. Scale has no part in it, except that an ancestor of negative scale mirrors.
+    ///
+    /// `KHR_lights_punctual`: "the rotation of the node orients the light accordingly"; glTF 2.0, section 3.10: a view
+    /// follows from the node's transform "with the scaling ignored".
+    pub orientations: Vec<DMat3>,
     /// Nodes of the chosen scene, parents before children, without those that are to be ignored.
     pub visible: Vec<usize>,
 }
@@ -22,9 +29,9 @@ impl Nodes {
     pub fn build(document: &Document, scene: Option<usize>, warnings: &mut Vec<String>) -> Result<Nodes, SceneError> {
         let is_child = check_parents(document)?;
         let top: Vec<usize> = (0..document.nodes.len()).filter(|&node| !is_child[node]).collect();
-        let placements = place(document, &top)?;
+        let (placements, orientations) = place(document, &top)?;
         let roots = scene_roots(document, scene, top, warnings)?;
-        Ok(Nodes { placements, visible: walk(document, &roots, warnings)? })
+        Ok(Nodes { placements, orientations, visible: walk(document, &roots, warnings)? })
     }
 }
 
@@ -56,12 +63,14 @@ fn check_parents(document: &Document) -> Result<Vec<bool>, SceneError> {
     Ok(is_child)
 }
 
-/// World transforms of all nodes. The walk starts at the nodes without parent (`top`). Each node has at most one
+/// World transforms and orientations of all nodes. The walk starts at the nodes without parent (`top`). Each node has at most one
 /// parent, so the nodes that the walk does not reach lie on or below a cycle.
-fn place(document: &Document, top: &[usize]) -> Result<Vec<Placement>, SceneError> {
+fn place(document: &Document, top: &[usize]) -> Result<(Vec<Placement>, Vec<DMat3>), SceneError> {
     let mut placements = vec![None; document.nodes.len()];
-    let mut stack: Vec<(usize, Placement)> = top.iter().map(|&node| (node, Placement::IDENTITY)).collect();
-    while let Some((index, parent)) = stack.pop() {
+    let mut orientations = vec![DMat3::IDENTITY; document.nodes.len()];
+    let mut stack: Vec<(usize, Placement, DMat3)> =
+        top.iter().map(|&node| (node, Placement::IDENTITY, DMat3::IDENTITY)).collect();
+    while let Some((index, parent, inherited)) = stack.pop() {
         let node = &document.nodes[index];
         let placement = parent.child(&Local::of_node(node));
         if !placement.is_finite() {
@@ -73,13 +82,18 @@ fn place(document: &Document, top: &[usize]) -> Result<Vec<Placement>, SceneErro
             ));
         }
         placements[index] = Some(placement);
-        stack.extend(children(node).map(|child| (child, placement)));
+        let turn = Turn::of_node(node);
+        orientations[index] = inherited * turn.rotation;
+        let inherited = inherited * turn.inherited;
+        stack.extend(children(node).map(|child| (child, placement, inherited)));
     }
     let cycle = |index: usize| {
         let what = "is its own ancestor";
         document.invalid(node_label(document, index), what, "remove the cycle from the node tree")
     };
-    placements.into_iter().enumerate().map(|(index, p)| p.ok_or_else(|| cycle(index))).collect()
+    let placements: Result<_, _> =
+        placements.into_iter().enumerate().map(|(index, p)| p.ok_or_else(|| cycle(index))).collect();
+    Ok((placements?, orientations))
 }
 
 fn scene_roots(

@@ -8,6 +8,59 @@ use glam::{DMat3, DQuat, DVec3};
 use gltf::json::Node;
 use twofloat::TwoFloat;
 
+/// What a node's transform does to directions, without the sizes of its scale.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Turn {
+    /// The node's rotation: all that a light or a camera on this node takes from its transform.
+    pub rotation: DMat3,
+    /// The rotation with the signs of the scale: what the node's children inherit. A node that mirrors its children
+    /// mirrors the directions of their lights too.
+    pub inherited: DMat3,
+}
+
+impl Turn {
+    pub fn of_node(node: &Node) -> Turn {
+        match &node.matrix {
+            Some(matrix) => Turn::of_linear(&Local::from_matrix(matrix).linear),
+            None => {
+                let rotation = Local::from_trs([0.0; 3], node.rotation.unwrap_or_default().0, [1.0; 3]).linear;
+                let sign = |scale: f32| if scale < 0.0 { -1.0 } else { 1.0 };
+                let signs = DVec3::from_array(node.scale.unwrap_or([1.0; 3]).map(sign));
+                Turn { rotation, inherited: rotation * DMat3::from_diagonal(signs) }
+            }
+        }
+    }
+
+    /// From a matrix, whose scale has no signs of its own. A mirroring matrix counts as one with a negative scale along
+    /// x, the usual convention of decompositions.
+    fn of_linear(linear: &DMat3) -> Turn {
+        let mirrored = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
+        let inherited = nearest_orthogonal(linear);
+        let rotation = if is_mirrored(linear) { nearest_orthogonal(&(*linear * mirrored)) } else { inherited };
+        Turn { rotation, inherited }
+    }
+}
+
+/// The orthogonal factor of the polar decomposition `linear = Q·P` with P symmetric and not negative: the orthogonal
+/// matrix nearest to it (Fan & Hoffman 1955). For columns that are perpendicular, as glTF requires of a node's matrix,
+/// these are the columns at unit length; a sheared matrix turns by as much as its axes do on average.
+fn nearest_orthogonal(linear: &DMat3) -> DMat3 {
+    /// Cosine between columns from which a matrix counts as sheared: f32 entries round by 6e-8.
+    const SHEARED: f64 = 1e-6;
+    let a = of_unit_size(linear);
+    let unit = [a.x_axis, a.y_axis, a.z_axis].map(DVec3::normalize_or_zero);
+    let [x, y, z] = unit;
+    let lengths_are_one = unit.iter().all(|axis| *axis != DVec3::ZERO);
+    if lengths_are_one && [x.dot(y), y.dot(z), z.dot(x)].iter().all(|cosine| cosine.abs() < SHEARED) {
+        return DMat3::from_cols(x, y, z);
+    }
+    let svd = nalgebra::Matrix3::from_column_slice(&a.to_cols_array()).svd(true, true);
+    match (svd.u, svd.v_t) {
+        (Some(u), Some(v_t)) => DMat3::from_cols_slice((u * v_t).as_slice()),
+        _ => DMat3::IDENTITY,
+    }
+}
+
 /// A local transform: `x ↦ linear·x + translation`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Local {
@@ -152,6 +205,24 @@ mod tests {
         for distance in [1e5, 1e6, 3e7] {
             let far = Local { linear: DMat3::IDENTITY, translation: DVec3::new(distance, -distance, 0.1 * distance) };
             assert_eq!(chain(Placement::IDENTITY.child(&far)), here);
+        }
+    }
+
+    #[test]
+    fn the_nearest_orthogonal_matrix_is_that_of_the_polar_decomposition() {
+        let turn = DMat3::from_quat(DQuat::from_rotation_y(0.7) * DQuat::from_rotation_x(-1.1));
+        // Q·P with P symmetric and positive: the decomposition is unique.
+        let stretch =
+            DMat3::from_cols(DVec3::new(2.0, 0.3, 0.1), DVec3::new(0.3, 1.0, -0.2), DVec3::new(0.1, -0.2, 0.7));
+        for (q, p) in
+            [(turn, stretch), (turn * -1.0, stretch), (turn, DMat3::from_diagonal(DVec3::new(1e-9, 3.0, 5.0)))]
+        {
+            assert!(nearest_orthogonal(&(q * p)).abs_diff_eq(q, 1e-12), "{q}");
+        }
+        // Where no decomposition is unique it is still orthogonal.
+        for singular in [DMat3::ZERO, DMat3::from_cols(DVec3::X, DVec3::X, DVec3::ZERO)] {
+            let q = nearest_orthogonal(&singular);
+            assert!((q * q.transpose()).abs_diff_eq(DMat3::IDENTITY, 1e-12), "{q}");
         }
     }
 

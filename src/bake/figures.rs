@@ -37,6 +37,9 @@ pub struct Numerics {
     pub hits_outside_volume: u64,
     pub probes_inside_geometry: usize,
     pub dropped_triangles: u64,
-    /// Materials whose albedo can exceed `solver.albedo_max`, and is clamped to it.
+    /// Materials whose albedo can exceed `materials.albedo_max`, and is clamped to it.
     pub albedo_clamped: u64,
+    /// Lights, emissive materials and sky texels of the scene, and captured hits, whose light exceeds the largest that is
+    /// computed with, 10³⁰ per channel, and is clamped to it.
+    pub light_clamped: u64,
 }

@@ -45,7 +45,7 @@ pub fn gather<'p, F: Fn(usize) -> ProbeCapture + Sync>(
     let mut occlusion = prepared.occlusion_builder();
     let at_once = (CHUNK_BYTES / surfels_bytes(config).max(1)) as usize;
     let at_once = at_once.clamp(rayon::current_num_threads().min(CHUNK), CHUNK);
-    let (mut rays, mut outside, mut non_finite, mut bytes) = ((0, 0), 0, 0, 0);
+    let (mut rays, mut outside, mut non_finite, mut light_clamped, mut bytes) = ((0, 0), 0, 0, 0, 0);
     log.stage(
         |times| &mut times.capture,
         "capturing",
@@ -66,6 +66,7 @@ pub fn gather<'p, F: Fn(usize) -> ProbeCapture + Sync>(
                     rays.1 += capture.rays.shadow;
                     outside += capture.hits_outside_volume;
                     non_finite += capture.non_finite;
+                    light_clamped += capture.light_clamped;
                     occlusion.set(probe, &filtered);
                     bytes += capture.bytes();
                     if circumstances.memory_budget_bytes.is_none_or(|budget| bytes <= budget) {
@@ -78,5 +79,6 @@ pub fn gather<'p, F: Fn(usize) -> ProbeCapture + Sync>(
     (log.rays.primary, log.rays.shadow) = rays;
     log.numerics.hits_outside_volume += outside;
     log.numerics.non_finite += non_finite;
+    log.numerics.light_clamped += light_clamped;
     (Budgeted { stored, trace }, occlusion.finish())
 }

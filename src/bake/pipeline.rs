@@ -45,6 +45,7 @@ impl Prepared<'_, '_> {
         log.numerics.probes_inside_geometry = self.placement.count(ProbeState::InsideGeometry);
         log.numerics.dropped_triangles = self.world.scene.dropped.total();
         log.numerics.albedo_clamped = self.world.clamped_materials();
+        log.numerics.light_clamped += self.world.scene.light_clamped;
 
         let capture = self.capture(circumstances);
         let trace = |probe: usize| self.trace(&capture, probe);

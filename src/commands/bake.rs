@@ -16,7 +16,8 @@ use crate::probe::lattice::ProbeState;
 use crate::probe::transport::checkpoint;
 use crate::report::bake::{BakeReport, BytesPerProbe, SCHEMA, SolverReport};
 use crate::report::table::{Column, Table};
-use crate::scene::Scene;
+use crate::scene::light::LIGHT_MAX;
+use crate::scene::{Detail, Scene};
 use crate::system::format;
 use crate::system::memory::peak_memory_bytes;
 use crate::system::output::Named;
@@ -70,6 +71,7 @@ fn opening<'a>(args: &'a BakeArgs, config: &Config) -> Result<Opening<'a>> {
         scene: args.scene.as_deref().context("no scene: give a .glb or .gltf file")?,
         trace: &args.trace,
         light: config.light(),
+        detail: Detail::LIGHT,
         keep_images: config.plan.keeps_everything(),
         inputs: config_file.into_iter().collect(),
         outputs: outputs(args)?,
@@ -218,6 +220,13 @@ fn warn_about(report: &BakeReport, config: &Config, console: &Console) {
     }
     if numerics.non_finite > 0 {
         console.warn(format!("{} values were not finite and count as zero", numerics.non_finite));
+    }
+    if numerics.light_clamped > 0 {
+        console.warn(format!(
+            "{} lights or lit hits are brighter than {LIGHT_MAX:e} and clamped to that; lower the intensities, or set \
+             lights.punctual_scale",
+            numerics.light_clamped
+        ));
     }
     if numerics.albedo_clamped > 0 {
         console.say(format!(

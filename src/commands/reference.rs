@@ -16,7 +16,7 @@ use crate::light::path::Strategy;
 use crate::math::blocks::BLOCK;
 use crate::report::reference::{NoiseReport, Rays, ReferenceReport, ReferenceTimes, SCHEMA};
 use crate::report::table::{Column, Table};
-use crate::scene::Camera;
+use crate::scene::{Camera, Detail};
 use crate::shade::film::NoiseLevel;
 use crate::shade::points::has_blend;
 use crate::shade::reference::{Reference, ReferenceSettings, State, Tracing};
@@ -95,6 +95,10 @@ fn opening<'a>(args: &'a ReferenceArgs, config: &Config) -> Opening<'a> {
         scene: &args.scene,
         trace: &args.trace,
         light: config.light(),
+        detail: match args.transport {
+            TransportName::Lambert => Detail::PICTURE,
+            TransportName::Gltf => Detail::GLOSSY,
+        },
         keep_images: false,
         inputs: config_file.into_iter().collect(),
         outputs: [Named::new("-o", &args.output)].into_iter().chain(report).collect(),

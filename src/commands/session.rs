@@ -12,7 +12,7 @@ use crate::config::{Config, Layers, presets};
 use crate::light::World;
 use crate::probe::file::{LightRecord, SceneRecord};
 use crate::report::header::{Header, command_line};
-use crate::scene::{self, EnvironmentSource, LoadOptions, Scene};
+use crate::scene::{self, Detail, EnvironmentSource, LoadOptions, Scene};
 use crate::system::output::{Named, check_apart, check_outputs};
 
 /// What a session is opened with.
@@ -21,6 +21,8 @@ pub struct Opening<'a> {
     pub trace: &'a TraceArgs,
     /// The light that the configuration, or the probe file, gives the scene.
     pub light: LightRecord,
+    /// What the command looks at of materials.
+    pub detail: Detail,
     /// Whether images whose texels are all equal are kept whole.
     pub keep_images: bool,
     /// Files that the command reads besides the scene and its sky.
@@ -53,6 +55,8 @@ impl<'c> Session<'c> {
         let from_light = light.sky.map(|sky| EnvironmentSource::Constant(sky.into()));
         let environment = trace.env.clone().or(from_light);
         let options = LoadOptions {
+            unassigned: light.unassigned,
+            detail: opening.detail,
             environment,
             environment_rotate_deg: trace.env_rotate,
             environment_scale: trace.env_scale,
@@ -64,6 +68,9 @@ impl<'c> Session<'c> {
             console.warn(format!("{}: {warning}", path.display()));
         }
         let load_s = started.elapsed().as_secs_f64();
+        if !opening.detail.gloss {
+            tell::metal(console, path, &scene);
+        }
         let session = Session { console, scene, light, seed: trace.seed, threads, started, load_s };
         session.check_apart(&opening.outputs)?;
         tell::scene(console, path, &session.scene, load_s);

@@ -34,6 +34,22 @@ pub fn scene(console: &Console, path: &Path, scene: &Scene, load_s: f64) {
     ));
 }
 
+/// Warns of metal, which is black where all surfaces are Lambertian.
+pub fn metal(console: &Console, path: &Path, scene: &Scene) {
+    /// Shares that are printed as 0 % are of no use.
+    const LEAST: f64 = 0.005;
+    let share = scene.metal_share();
+    if share < LEAST {
+        return;
+    }
+    let all = if share > 1.0 - LEAST { "all".to_owned() } else { format!("{:.0} %", 100.0 * share) };
+    console.warn(format!(
+        "{}: {all} of the surface area is metal, which reflects no diffuse light and bakes black; give its materials a lower \
+         metallicFactor (it is 1 where a material names none), or see the metal with `reference --transport gltf`",
+        path.display()
+    ));
+}
+
 pub fn accel(console: &Console, seconds: f64) {
     console.say(format!("acceleration structure: built in {}", format::seconds(seconds)));
 }

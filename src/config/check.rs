@@ -4,9 +4,15 @@
 use super::ron_text::ConfigError;
 use super::settings::{Config, STAGES};
 use crate::probe::lattice::grid::Bounds;
+use crate::scene::Unassigned;
+use crate::scene::light::LIGHT_MAX;
 
 /// Largest resolution of any octahedral map, texels per side.
 pub const MAX_RESOLUTION: usize = 1024;
+
+/// Largest factor on punctual lights. Units differ by 683 at most, and the product with the brightest light that is
+/// computed with, 1e30, must be finite in f32.
+const MAX_PUNCTUAL_SCALE: f32 = 1e6;
 
 /// Coordinates and distances, metres: squares and cubes of such lengths are far from the end of f32.
 const MAX_LENGTH_M: f64 = 1e9;
@@ -14,7 +20,6 @@ const MAX_LENGTH_M: f64 = 1e9;
 const MIN_SPACING_M: f64 = 1e-12;
 
 const UNIT_RULE: &str = "use a number from 0 to 1";
-const POSITIVE_RULE: &str = "use a finite number, not negative";
 
 impl Config {
     /// Refuses what no stage could work with.
@@ -25,7 +30,6 @@ impl Config {
                 first_error = Err(ConfigError::OutOfRange { place: place.to_owned(), key, value, rule });
             }
         };
-        let not_negative = |x: f32| x.is_finite() && x >= 0.0;
         let g = &self.grid;
         if let Some(spacing) = g.spacing_m {
             let holds = (MIN_SPACING_M..=MAX_LENGTH_M).contains(&spacing);
@@ -43,14 +47,19 @@ impl Config {
         }
         rule("grid.padding", g.padding.to_string(), (0.0..=1.0).contains(&g.padding), UNIT_RULE);
         let scale = self.lights.punctual_scale;
-        rule("lights.punctual_scale", scale.to_string(), not_negative(scale), POSITIVE_RULE);
+        let scale_rule = "use a number from 0 to 1e6";
+        rule("lights.punctual_scale", scale.to_string(), (0.0..=MAX_PUNCTUAL_SCALE).contains(&scale), scale_rule);
         if let Some(sky) = self.lights.sky {
-            let holds = not_negative(sky.0) && not_negative(sky.1) && not_negative(sky.2);
-            rule("lights.sky", format!("{sky:?}"), holds, POSITIVE_RULE);
+            let holds = [sky.0, sky.1, sky.2].iter().all(|channel| (0.0..=LIGHT_MAX).contains(channel));
+            rule("lights.sky", format!("{sky:?}"), holds, "use numbers from 0 to 1e30");
         }
         let albedo = self.materials.albedo_max;
         let albedo_rule = "use a number from 0 up to but not including 1";
         rule("materials.albedo_max", albedo.to_string(), (0.0..1.0).contains(&albedo), albedo_rule);
+        if let Unassigned::Diffuse { albedo } = self.materials.unassigned {
+            let key = "materials.unassigned.diffuse.albedo";
+            rule(key, albedo.to_string(), (0.0..=1.0).contains(&albedo), UNIT_RULE);
+        }
         rule("store.border", self.store.border.to_string(), self.store.border <= 1, "use 0 or 1");
         self.placement.rule.check(&mut rule);
         self.placement.survey.check(&mut rule);

@@ -11,6 +11,7 @@ const FORMS: &[(&str, &str)] = &[
     ("chebyshev", "chebyshev(power: 3, floor: 0.05)"),
     ("moments", "moments(power: 3, floor: 0.05)"),
     ("surface", "surface(voxels_per_cell: 8)"),
+    ("diffuse", "diffuse(albedo: 0.8)"),
 ];
 
 /// What is wrong in a configuration file of this text.

@@ -10,6 +10,7 @@ use crate::probe::place::PlacementSettings;
 use crate::probe::query::QuerySettings;
 use crate::probe::store::StoreSettings;
 use crate::probe::transport::Transport;
+use crate::scene::Unassigned;
 
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -45,11 +46,13 @@ impl Default for LightSettings {
 pub struct MaterialSettings {
     /// Albedos are clamped to this, 0 up to but not including 1: at 1 light would never end.
     pub albedo_max: f32,
+    /// The material of meshes that have none.
+    pub unassigned: Unassigned,
 }
 
 impl Default for MaterialSettings {
     fn default() -> Self {
-        MaterialSettings { albedo_max: 0.999 }
+        MaterialSettings { albedo_max: 0.999, unassigned: Unassigned::default() }
     }
 }
 
@@ -121,6 +124,7 @@ impl Config {
             punctual_scale: self.lights.punctual_scale,
             sky: self.lights.sky,
             albedo_max: self.materials.albedo_max,
+            unassigned: self.materials.unassigned,
         }
     }
 }

@@ -7,6 +7,7 @@ use crate::probe::query::VisibilityTest;
 use crate::probe::store::OcclusionStore;
 use crate::probe::store::moments::MomentsStore;
 use crate::probe::transport::{BounceSettings, Transport};
+use crate::scene::Unassigned;
 
 fn with(assignments: &[&str]) -> Result<Config, ConfigError> {
     Config::default().with_overrides(&assignments.iter().map(|s| s.to_string()).collect::<Vec<_>>())
@@ -134,11 +135,16 @@ fn values_of_every_kind() {
         "query.test=chebyshev(power: 3, floor: 0.05)",
         "query.test.chebyshev.power=2",
         "plan.keep=[\"visibility\"]",
+        "materials.unassigned=gltf",
+        "materials.unassigned=diffuse(albedo: 0.3)",
+        "materials.unassigned.diffuse.albedo=0.4",
     ])
     .unwrap();
     assert_eq!(config.grid.divisions, Some((3, 4, 5)));
     assert_eq!(config.transport, Transport::Bounces(BounceSettings { tolerance: 1e-3, ..Default::default() }));
     assert_eq!(config.query.test, VisibilityTest::Chebyshev { power: 2.0, floor: 0.05 });
+    assert_eq!(config.materials.unassigned, Unassigned::Diffuse { albedo: 0.4 });
+    assert_eq!(with(&["materials.unassigned=gltf"]).unwrap().materials.unassigned, Unassigned::Gltf);
     assert!(config.plan.keeps("visibility") && !config.plan.keeps("sky"));
 }
 
@@ -162,6 +168,11 @@ fn mistakes_are_named() {
         ("grid=(spacing_m: inf)", "positive"),
         ("query.visibility=moments(power: 1e39, floor: 0)", "finite"),
         ("plan.keep=[\"visible\"]", "plan.keep is visible"),
+        ("materials.unassigned=diffuse", "diffuse(albedo: 0.8)"),
+        ("materials.unassigned=diffuse(albedo: 1.5)", "materials.unassigned.diffuse.albedo"),
+        ("materials.unassigned=metal", "the choices are diffuse, gltf"),
+        ("lights.punctual_scale=1e7", "1e6"),
+        ("lights.sky=(1e31, 0, 0)", "1e30"),
     ] {
         let error = with(&[assignment]).map(|c| c.to_ron()).unwrap_err().to_string();
         assert!(error.contains(expected), "{assignment}: {error}");

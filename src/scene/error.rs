@@ -38,5 +38,15 @@ pub enum SceneError {
     Empty { file: PathBuf, what: String },
 }
 
+impl SceneError {
+    /// The fault and its place in the file, for warnings, which name the file themselves.
+    pub(super) fn in_file(&self) -> String {
+        match self {
+            SceneError::Invalid { place, what, .. } => format!("{place}: {what}"),
+            other => other.to_string(),
+        }
+    }
+}
+
 /// The usual remedy for data that breaks the rules of glTF.
 pub(super) const RE_EXPORT: &str = "export the file again or check it with gltf_validator";

@@ -47,6 +47,16 @@ impl Material {
     pub fn emits(&self) -> bool {
         self.unlit || self.emission != Vec3::ZERO
     }
+
+    /// The texture slots with the names that they have in glTF.
+    pub fn textures(&self) -> [(&'static str, Option<TextureRef>); 4] {
+        [
+            ("baseColorTexture", self.base_color_texture),
+            ("metallicRoughnessTexture", self.metallic_roughness_texture),
+            ("emissiveTexture", self.emission_texture),
+            ("normalTexture", self.normal_texture),
+        ]
+    }
 }
 
 /// A texture as one material slot uses it.

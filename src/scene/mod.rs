@@ -12,6 +12,7 @@ mod load;
 mod lookup;
 pub mod material;
 pub mod mesh;
+mod metal;
 mod options;
 pub mod range;
 mod texture;
@@ -24,7 +25,7 @@ pub use light::{LightKind, PunctualLight};
 pub use load::load;
 pub use material::{AlphaMode, Material, MaterialIndex, Texels, Texture, TextureIndex, TextureRef, Wrap};
 pub use mesh::{Mesh, TriangleIndex};
-pub use options::{EnvironmentSource, EnvironmentSourceError, LoadOptions};
+pub use options::{Detail, EnvironmentSource, EnvironmentSourceError, LoadOptions, Unassigned};
 
 use std::path::PathBuf;
 
@@ -43,13 +44,21 @@ pub struct Scene {
     pub lights: Vec<PunctualLight>,
     pub cameras: Vec<Camera>,
     pub environment: Environment,
-    /// BLAKE3 over all input bytes in the order of reading: scene file, buffers, images and environment map.
+    /// The material that meshes without one have. `None` if all meshes have one.
+    pub unassigned: Option<Unassigned>,
+    /// BLAKE3 over all input bytes that light depends on, in the order of reading: scene file, buffers, images and
+    /// environment map.
     pub blake3: String,
-    /// The files that were read, in the same order.
+    /// The same over the image files that only pictures show: normal maps, and what only gloss needs. `None` if no such
+    /// file was read.
+    pub pictures_blake3: Option<String>,
+    /// The files that were read.
     pub files: Vec<PathBuf>,
     /// One sentence for each thing that the loader left out or replaced.
     pub warnings: Vec<String>,
     pub dropped: DroppedTriangles,
+    /// Number of lights, emissive materials and sky texels that are brighter than [`light::LIGHT_MAX`], and clamped to it.
+    pub light_clamped: u64,
 }
 
 /// Numbers of triangles that the loader dropped because rays cannot hit them.

@@ -1,14 +1,20 @@
 //! Options of loading a scene.
 
+use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// Options of [`super::load`].
 #[derive(Debug, Clone)]
 pub struct LoadOptions {
+    /// The material of meshes without one.
+    pub unassigned: Unassigned,
+    /// What is read of materials. All else is not read and cannot be at fault.
+    pub detail: Detail,
     /// The sky. glTF files contain none.
     pub environment: Option<EnvironmentSource>,
     /// Turn of an environment map about +Y, degrees, finite. See
@@ -25,6 +31,8 @@ pub struct LoadOptions {
 impl Default for LoadOptions {
     fn default() -> Self {
         LoadOptions {
+            unassigned: Unassigned::default(),
+            detail: Detail::GLOSSY,
             environment: None,
             environment_rotate_deg: 0.0,
             environment_scale: 1.0,
@@ -32,6 +40,50 @@ impl Default for LoadOptions {
             collapse_constant_images: true,
         }
     }
+}
+
+/// The material of meshes that have none in the file.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Unassigned {
+    /// A rough white surface of this diffuse albedo, 0 to 1.
+    Diffuse { albedo: f32 },
+    /// The default material of glTF 2.0, section 3.9.1: a white metal, which reflects no diffuse light.
+    Gltf,
+}
+
+impl Default for Unassigned {
+    fn default() -> Self {
+        Unassigned::Diffuse { albedo: 0.8 }
+    }
+}
+
+impl fmt::Display for Unassigned {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Unassigned::Diffuse { albedo } => write!(f, "diffuse(albedo: {albedo})"),
+            Unassigned::Gltf => f.write_str("gltf"),
+        }
+    }
+}
+
+/// The textures that a command looks at besides those that diffuse light depends on. These are base colour, metalness,
+/// emission and alpha, each only where its factor lets it matter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Detail {
+    /// Normal maps and tangents, which bend what a camera sees.
+    pub normal_maps: bool,
+    /// Roughness, and the colour of metals.
+    pub gloss: bool,
+}
+
+impl Detail {
+    /// What a bake needs.
+    pub const LIGHT: Detail = Detail { normal_maps: false, gloss: false };
+    /// What pictures of diffuse surfaces need.
+    pub const PICTURE: Detail = Detail { normal_maps: true, gloss: false };
+    /// What pictures of glossy surfaces need.
+    pub const GLOSSY: Detail = Detail { normal_maps: true, gloss: true };
 }
 
 /// The source of the sky. On the command line it is written `FILE.hdr`, `FILE.exr`, `FILE.exr:LAYER` or `R,G,B`.

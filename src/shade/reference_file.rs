@@ -45,7 +45,11 @@ impl Identity {
         let optional = |x: Option<String>| x.unwrap_or_else(|| "none".to_owned());
         // Rust prints the shortest text that reads back to the same number, so equal texts mean equal numbers.
         let camera_numbers = format!("{:?} {:?} {:?}", camera.position, camera.world_from_camera, camera.projection);
-        Identity(vec![
+        let scene = &world.scene;
+        // Scenes without such meshes or files have no such entry.
+        let unassigned = scene.unassigned.map(|unassigned| ("unassigned", unassigned.to_string()));
+        let pictures = scene.pictures_blake3.clone().map(|hash| ("pictures_blake3", hash));
+        let entries = [
             ("format", FORMAT.to_owned()),
             ("scene_blake3", world.scene.blake3.clone()),
             ("punctual_scale", world.punctual_scale.to_string()),
@@ -58,7 +62,8 @@ impl Identity {
             ("strategy", format!("{:?}", settings.strategy).to_lowercase()),
             ("max_bounces", optional(settings.max_bounces.map(|b| b.to_string()))),
             ("firefly_clamp", optional(settings.firefly_clamp.map(|c| c.to_string()))),
-        ])
+        ];
+        Identity(entries.into_iter().chain(unassigned).chain(pictures).collect())
     }
 }
 
@@ -70,7 +75,7 @@ impl Identity {
 }
 
 /// The entries of an [`Identity`] that say which picture it is. The other entries say how it was made.
-const PICTURE: &[&str] = &["scene_blake3", "punctual_scale", "albedo_max", "camera_view", "size"];
+const PICTURE: &[&str] = &["scene_blake3", "punctual_scale", "albedo_max", "unassigned", "camera_view", "size"];
 
 impl Identity {
     /// Compares with a picture from a file. Returns in words the first difference of scene, camera or size, or `None`
@@ -87,6 +92,8 @@ impl Identity {
 fn describe(name: &str) -> String {
     match name {
         "scene_blake3" => "scene (its files or its sky)".to_owned(),
+        "unassigned" => "material of meshes without one (materials.unassigned)".to_owned(),
+        "pictures_blake3" => "images (normal maps or roughness)".to_owned(),
         name => name.replace('_', " "),
     }
 }

@@ -264,10 +264,11 @@ pub fn check_shared(ladders: &[Ladder]) -> Result<(), SweepError> {
     let rungs = || ladders.iter().flat_map(|ladder| &ladder.rungs);
     let Some(first) = rungs().next() else { return Ok(()) };
     type Value = fn(&Config) -> String;
-    let keys: [(&'static str, Value); 3] = [
+    let keys: [(&'static str, Value); 4] = [
         ("lights.punctual_scale", |c| c.lights.punctual_scale.to_string()),
         ("lights.sky", |c| c.lights.sky.map_or("None".to_owned(), |sky| format!("{sky:?}"))),
         ("materials.albedo_max", |c| c.materials.albedo_max.to_string()),
+        ("materials.unassigned", |c| c.materials.unassigned.to_string()),
     ];
     for (key, value) in keys {
         if let Some(other) = rungs().find(|rung| value(&rung.config) != value(&first.config)) {
@@ -355,9 +356,12 @@ mod tests {
 
     #[test]
     fn what_the_reference_depends_on_must_agree() {
-        for (key, value) in
-            [("lights.punctual_scale", "2.0"), ("materials.albedo_max", "0.5"), ("lights.sky", "(1, 1, 1)")]
-        {
+        for (key, value) in [
+            ("lights.punctual_scale", "2.0"),
+            ("materials.albedo_max", "0.5"),
+            ("materials.unassigned", "gltf"),
+            ("lights.sky", "(1, 1, 1)"),
+        ] {
             let text = format!("(ladders: [(name: \"a\"), (name: \"b\", set: [\"{key}={value}\"])])");
             let error = check_shared(&expanded(&text).unwrap()).unwrap_err().to_string();
             assert!(error.contains(key) && error.contains("'a'") && error.contains("'b'"), "{error}");

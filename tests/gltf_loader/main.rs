@@ -7,6 +7,7 @@ mod damage;
 mod distance;
 mod geometry;
 mod lights;
+mod looked_at;
 mod materials;
 mod promises;
 mod skies;

@@ -56,7 +56,7 @@ fn texture_transforms_and_materials() {
     assert!(message.contains("a b.png") && message.contains("material 0 'm' baseColorTexture"), "{message}");
 }
 
-fn png(width: u32, height: u32, pixels: &[[u8; 4]]) -> Vec<u8> {
+pub fn png(width: u32, height: u32, pixels: &[[u8; 4]]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let image = image::RgbaImage::from_raw(width, height, pixels.as_flattened().to_vec()).expect("that many pixels");
     image.write_to(&mut std::io::Cursor::new(&mut bytes), image::ImageFormat::Png).expect("a PNG");

@@ -23,7 +23,7 @@ use crate::probe::Volume;
 use crate::probe::file::{self, ProbeFile};
 use crate::probe::query::Query;
 use crate::report::render::{RenderReport, RenderTimes, SCHEMA};
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Detail, Scene};
 use crate::shade::points::see;
 use crate::shade::visibility_modes::VisibilityMode;
 use crate::system::memory::peak_memory_bytes;
@@ -91,6 +91,7 @@ fn opening<'a>(args: &'a RenderArgs, probes: &ProbeFile) -> Opening<'a> {
         scene: &args.scene,
         trace: &args.trace,
         light: probes.query.light,
+        detail: Detail::PICTURE,
         keep_images: false,
         inputs: vec![Named::new("the probe file", &args.probes)],
         // Each camera has pictures of its own, in a folder of its own.

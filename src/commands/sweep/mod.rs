@@ -19,6 +19,7 @@ use super::{Console, check_picture_memory, tell};
 use crate::cli::SweepArgs;
 use crate::evaluate::{Comparison, Scenery};
 use crate::report::sweep::SweepTimes;
+use crate::scene::Detail;
 use crate::shade::points::see;
 use crate::shade::reference::ReferenceSettings;
 use crate::shade::regions::regions;
@@ -46,6 +47,7 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
         scene: &args.scene,
         trace: &args.trace,
         light: config.light(),
+        detail: Detail::PICTURE,
         keep_images,
         inputs: configurations(args, file.as_ref()),
         // In a folder that does not exist nothing is in the way.

@@ -84,10 +84,13 @@ fn scene(lamps: &[Lamp], environment: Environment) -> Scene {
         lights: Vec::new(),
         cameras: Vec::new(),
         environment,
+        unassigned: None,
         blake3: String::new(),
+        pictures_blake3: None,
         files: Vec::new(),
         warnings: Vec::new(),
         dropped: Default::default(),
+        light_clamped: 0,
     }
 }
 

@@ -22,6 +22,7 @@ use crate::light::surface::SurfacePoint;
 use crate::math::blocks::{BLOCK, Block};
 use crate::math::random::{KroneckerSequence, Purpose, Random};
 use crate::math::statistics::Moments;
+use crate::scene::light::LIGHT_MAX;
 use crate::trace::Ray;
 
 /// How the light of emissive surfaces and the sky reaches the surfaces that probes see.
@@ -101,6 +102,8 @@ pub struct ProbeCapture {
     pub hits_outside_volume: u64,
     /// Non-finite values found and replaced by zero.
     pub non_finite: u64,
+    /// Hits whose irradiance reaches [`LIGHT_MAX`], and is clamped to it.
+    pub light_clamped: u64,
 }
 
 /// What capturing needs besides the probe.
@@ -256,7 +259,7 @@ impl Capture<'_, '_> {
             Some(samples) => world.emitter_irradiance(surface, normal, samples, random, &mut out.rays),
             None => Vec3::ZERO,
         };
-        let mut direct = reflected_radiance(surface.albedo, punctual + sampled);
+        let mut direct = reflected_radiance(surface.albedo, out.bounded(punctual + sampled));
         if !direct.is_finite() {
             out.non_finite += 1;
             direct = Vec3::ZERO;
@@ -284,7 +287,7 @@ impl Capture<'_, '_> {
         let (punctual, shadow_rays) = world.punctual_irradiance(surface, normal, block(0).sample(0).salt());
         out.rays.shadow += u64::from(shadow_rays);
         let irradiance = punctual + (sum / f64::from(paths.max(1))).as_vec3();
-        let radiance = reflected_radiance(surface.albedo, irradiance);
+        let radiance = reflected_radiance(surface.albedo, out.bounded(irradiance));
         out.surfels.push(Surfel::new(&SurfacePoint { albedo: Vec3::ZERO, ..*surface }, radiance, ray.texel, ray.share));
     }
 
@@ -330,6 +333,13 @@ fn gathered_share(ray: &TexelRay, expected: f32) -> f32 {
 }
 
 impl ProbeCapture {
+    /// Irradiance that is at most [`LIGHT_MAX`]; counted where it reaches that.
+    fn bounded(&mut self, irradiance: Vec3) -> Vec3 {
+        let is_clamped = irradiance.max_element() >= LIGHT_MAX;
+        self.light_clamped += u64::from(is_clamped);
+        if is_clamped { irradiance.min(Vec3::splat(LIGHT_MAX)) } else { irradiance }
+    }
+
     /// Memory that it takes.
     pub fn bytes(&self) -> u64 {
         (self.surfels.capacity() * size_of::<Surfel>()

@@ -7,6 +7,7 @@ use serde::Deserialize;
 use super::record::{LightRecord, QUERY_VERSION, QueryRecord};
 use crate::probe::query::{Blend, DirectionWeight, QuerySettings, VisibilityTest};
 use crate::probe::store::surface::TableTest;
+use crate::scene::Unassigned;
 
 /// The keys that shading read; all others are passed over.
 #[derive(Default, Deserialize)]
@@ -152,6 +153,7 @@ pub fn query(config: &str) -> Result<QueryRecord, String> {
             punctual_scale: old.lights.punctual_scale,
             sky: old.lights.sky,
             albedo_max: old.solver.albedo_max,
+            unassigned: Unassigned::Gltf,
         },
     })
 }

@@ -6,6 +6,7 @@ use serde_json::Value;
 use crate::probe::container::Container;
 use crate::probe::query::QuerySettings;
 use crate::probe::store::Occlusion;
+use crate::scene::Unassigned;
 
 /// The metadata key `grid`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -36,7 +37,8 @@ pub struct SceneRecord {
 }
 
 /// Version of the metadata key `query` that this program writes. A change of what a look-up does raises it.
-pub const QUERY_VERSION: u32 = 1;
+/// 2 added `light.unassigned`.
+pub const QUERY_VERSION: u32 = 2;
 
 /// The metadata key `query`: all that a look-up and the shading around it need beside the tensors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -59,6 +61,13 @@ pub struct LightRecord {
     pub sky: Option<(f32, f32, f32)>,
     /// Albedos are clamped to this.
     pub albedo_max: f32,
+    /// The material of meshes that have none. Files without this key are older, and took glTF's.
+    #[serde(default = "of_old_files")]
+    pub unassigned: Unassigned,
+}
+
+fn of_old_files() -> Unassigned {
+    Unassigned::Gltf
 }
 
 impl QueryRecord {

@@ -10,6 +10,7 @@ use crate::probe::query::{Blend, DirectionWeight, QuerySettings, VisibilityTest}
 use crate::probe::store::IrradianceStore;
 use crate::probe::store::map::OctahedralMaps;
 use crate::probe::store::surface::TableTest;
+use crate::scene::Unassigned;
 
 fn volume() -> Volume {
     let grid = Grid::from_parts(DVec3::new(1e6, 0.0, -2.0), Vec3::new(1.0, 2.0, 3.0), UVec3::new(2, 1, 2)).unwrap();
@@ -33,7 +34,12 @@ fn record() -> QueryRecord {
             ..Default::default()
         },
         moved: true,
-        light: LightRecord { punctual_scale: 2.0, sky: Some((1.0, 2.0, 3.0)), albedo_max: 0.9 },
+        light: LightRecord {
+            punctual_scale: 2.0,
+            sky: Some((1.0, 2.0, 3.0)),
+            albedo_max: 0.9,
+            unassigned: Unassigned::Diffuse { albedo: 0.5 },
+        },
     }
 }
 
@@ -117,7 +123,8 @@ fn older_files_are_asked_as_they_were() {
         ..Default::default()
     };
     assert_eq!(record.weights, expected);
-    let light = LightRecord { punctual_scale: 0.5, sky: Some((1.0, 2.0, 3.0)), albedo_max: 0.9 };
+    let light =
+        LightRecord { punctual_scale: 0.5, sky: Some((1.0, 2.0, 3.0)), albedo_max: 0.9, unassigned: Unassigned::Gltf };
     assert_eq!((record.moved, record.light), (false, light));
     // And not even that under a table.
     let table = legacy::query("(query: (normal_bias: 0.25))").unwrap();

@@ -170,7 +170,7 @@ pub fn encode_colors(texels: &[Vec3], format: ColorFormat) -> EncodedColors {
         let v = *texel / scale;
         clamped += u64::from(v.min_element() < 0.0 || v.max_element() > format.max() || v.is_nan());
         match format {
-            ColorFormat::F32 => v.to_array().iter().for_each(|c| bytes.extend(c.to_le_bytes())),
+            ColorFormat::F32 => v.to_array().into_iter().map(finite).for_each(|c| bytes.extend(c.to_le_bytes())),
             ColorFormat::F16 => {
                 let codes = v.min(Vec3::splat(format.max())).to_array().map(f16::from_f32);
                 let stored = Vec3::from(codes.map(f16::to_f32));
@@ -185,6 +185,11 @@ pub fn encode_colors(texels: &[Vec3], format: ColorFormat) -> EncodedColors {
         }
     }
     EncodedColors { format, bytes, scale, clamped, underflowed }
+}
+
+/// The nearest finite number; 0 for NaN.
+fn finite(value: f32) -> f32 {
+    if value.is_nan() { 0.0 } else { value.clamp(f32::MIN, f32::MAX) }
 }
 
 /// Whether any channel above 0 has become 0.

@@ -2,9 +2,12 @@
 //!
 //! The types come from the `gltf` crate. Its validation is not used: it panics on a POSITION accessor that does not
 //! exist, and it refuses files that only lack `min`/`max`. Its readers are not used either, because they trust the
-//! counts in the file. Instead every index is checked when it is followed. Faults in elements that nothing refers to
-//! are ignored.
+//! counts in the file. Instead every index is checked when it is followed.
+//!
+//! Elements that many commands never look at are parsed only when something refers to them ([`Unparsed`]), so that a
+//! fault in a material, texture or camera that nobody uses stops nothing.
 
+use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
 use gltf::json::extensions::scene::khr_lights_punctual::Light;
@@ -30,16 +33,24 @@ pub(super) struct Document {
     pub accessors: Vec<Accessor>,
     pub views: Vec<View>,
     pub buffers: Vec<Buffer>,
-    pub materials: Vec<Material>,
-    pub textures: Vec<Texture>,
-    pub images: Vec<Image>,
-    pub samplers: Vec<Sampler>,
-    pub cameras: Vec<Camera>,
-    pub skins: Vec<Skin>,
+    pub materials: Unparsed<Material>,
+    pub textures: Unparsed<Texture>,
+    pub images: Unparsed<Image>,
+    pub samplers: Unparsed<Sampler>,
+    pub cameras: Unparsed<Camera>,
+    pub skins: Unparsed<Skin>,
     pub lights: Vec<Light>,
     /// Root nodes of each scene.
     pub scenes: Vec<Vec<usize>>,
     pub default_scene: Option<usize>,
+}
+
+/// A list of elements that are parsed one by one, when they are asked for.
+pub(super) struct Unparsed<T> {
+    /// Its key in the document.
+    key: &'static str,
+    elements: Vec<Value>,
+    parsed: PhantomData<T>,
 }
 
 impl Document {
@@ -74,12 +85,12 @@ impl Document {
             accessors: sections.take("accessors")?,
             views: sections.take("bufferViews")?,
             buffers: sections.take("buffers")?,
-            materials: sections.take("materials")?,
-            textures: sections.take("textures")?,
-            images: sections.take("images")?,
-            samplers: sections.take("samplers")?,
-            cameras: sections.take("cameras")?,
-            skins: sections.take("skins")?,
+            materials: sections.unparsed("materials")?,
+            textures: sections.unparsed("textures")?,
+            images: sections.unparsed("images")?,
+            samplers: sections.unparsed("samplers")?,
+            cameras: sections.unparsed("cameras")?,
+            skins: sections.unparsed("skins")?,
             lights: sections.take_lights()?,
             scenes: scenes.into_iter().map(|s| s.nodes.into_iter().map(|n| n as usize).collect()).collect(),
             default_scene: sections.default_scene()?,
@@ -99,10 +110,45 @@ impl Document {
         index: Index<T>,
         place: &dyn std::fmt::Display,
     ) -> Result<&'a T, SceneError> {
-        list.get(index.value()).ok_or_else(|| {
-            let what = format!("refers to {kind} {index}, but the file has {}", list.len());
-            self.invalid(place.to_string(), what, RE_EXPORT)
-        })
+        list.get(index.value()).ok_or_else(|| self.missing(kind, index.value(), list.len(), place))
+    }
+
+    /// The JSON of the element `index` of `list`, to which `place` refers. The error says that it does not exist.
+    pub fn json<'l, T>(
+        &self,
+        list: &'l Unparsed<T>,
+        kind: &str,
+        index: usize,
+        place: &dyn std::fmt::Display,
+    ) -> Result<&'l Value, SceneError> {
+        list.elements.get(index).ok_or_else(|| self.missing(kind, index, list.elements.len(), place))
+    }
+
+    /// The element `index` of `list`, to which `place` refers. The error says that it does not exist, or which of its
+    /// JSON is wrong.
+    pub fn parse_at<T: DeserializeOwned>(
+        &self,
+        list: &Unparsed<T>,
+        kind: &str,
+        index: Index<T>,
+        place: &dyn std::fmt::Display,
+    ) -> Result<T, SceneError> {
+        let value = self.json(list, kind, index.value(), place)?;
+        self.parse_element(list, index.value(), value)
+    }
+
+    /// Parses `value` as the element `index` of `list`.
+    pub fn parse_element<T: DeserializeOwned>(
+        &self,
+        list: &Unparsed<T>,
+        index: usize,
+        value: &Value,
+    ) -> Result<T, SceneError> {
+        T::deserialize(value).map_err(|e| self.invalid(format!("{}[{index}]", list.key), one_line(&e), RE_EXPORT))
+    }
+
+    fn missing(&self, kind: &str, index: usize, count: usize, place: &dyn std::fmt::Display) -> SceneError {
+        self.invalid(place.to_string(), format!("refers to {kind} {index}, but the file has {count}"), RE_EXPORT)
     }
 }
 
@@ -146,7 +192,22 @@ impl Sections<'_> {
         }
     }
 
+    fn unparsed<T>(&mut self, key: &'static str) -> Result<Unparsed<T>, SceneError> {
+        let elements = match self.root.remove(key) {
+            None => Vec::new(),
+            Some(value) => self.list(key, value)?,
+        };
+        Ok(Unparsed { key, elements, parsed: PhantomData })
+    }
+
     fn elements<T: DeserializeOwned>(&self, key: &str, value: Value) -> Result<Vec<T>, SceneError> {
+        let parse = |(index, value)| {
+            serde_json::from_value(value).map_err(|e| self.invalid(format!("{key}[{index}]"), one_line(&e)))
+        };
+        self.list(key, value)?.into_iter().enumerate().map(parse).collect()
+    }
+
+    fn list(&self, key: &str, value: Value) -> Result<Vec<Value>, SceneError> {
         let Value::Array(list) = value else {
             return Err(self.invalid(key.to_owned(), "is not a list".to_owned()));
         };
@@ -158,10 +219,7 @@ impl Sections<'_> {
                 remedy: "merge or instance them",
             });
         }
-        let parse = |(index, value)| {
-            serde_json::from_value(value).map_err(|e| self.invalid(format!("{key}[{index}]"), one_line(&e)))
-        };
-        list.into_iter().enumerate().map(parse).collect()
+        Ok(list)
     }
 
     fn invalid(&self, place: String, what: String) -> SceneError {

@@ -41,8 +41,8 @@ const MAX_TRIANGLES: u64 = 1 << 24;
 const MAX_DRAWS: u64 = 1 << 20;
 
 impl Draws {
-    /// Reads the meshes of all visible nodes.
-    pub fn collect(document: &Document, buffers: &Buffers, nodes: &Nodes) -> Result<Draws, SceneError> {
+    /// Reads the meshes of all visible nodes; their tangents only if `tangents` asks for them.
+    pub fn collect(document: &Document, buffers: &Buffers, nodes: &Nodes, tangents: bool) -> Result<Draws, SceneError> {
         let mut draws = Draws::default();
         let mut sizes: HashMap<usize, MeshSize> = HashMap::new();
         let mut decoded: HashMap<usize, Range<usize>> = HashMap::new();
@@ -64,7 +64,9 @@ impl Draws {
                 Some(range) => range.clone(),
                 None => {
                     let start = draws.primitives.len();
-                    draws.primitives.extend(primitive::read(document, buffers, mesh_index, mesh, &mut draws.skipped)?);
+                    let skipped = &mut draws.skipped;
+                    let read = primitive::read(document, buffers, mesh_index, mesh, tangents, skipped)?;
+                    draws.primitives.extend(read);
                     decoded.entry(mesh_index).or_insert(start..draws.primitives.len()).clone()
                 }
             };

@@ -1,4 +1,5 @@
-//! Reading the files of a scene. All bytes read enter the scene's hash.
+//! Reading the files of a scene. All bytes that light depends on enter the scene's hash. Images that only pictures show,
+//! as normal maps, have a hash of their own: a bake does not read them, and its hash must be that of a later render.
 
 use std::borrow::Cow;
 use std::io;
@@ -14,6 +15,8 @@ use crate::system::input::read_file;
 /// The files read so far, and the hash over them in the order of reading.
 pub(super) struct Inputs {
     hasher: blake3::Hasher,
+    /// Of the files that only pictures show, if there are any.
+    pictures: Option<blake3::Hasher>,
     /// Bytes of all files read. Counts in a damaged header are checked against it.
     pub bytes: u64,
     /// Paths of the files read.
@@ -29,7 +32,7 @@ pub(super) enum Resource {
 
 impl Inputs {
     pub fn new() -> Self {
-        Inputs { hasher: blake3::Hasher::new(), bytes: 0, files: Vec::new() }
+        Inputs { hasher: blake3::Hasher::new(), pictures: None, bytes: 0, files: Vec::new() }
     }
 
     /// Reads a regular file.
@@ -40,10 +43,18 @@ impl Inputs {
         Ok(bytes)
     }
 
-    /// Adds bytes to the hash. Their length goes first, so that inputs cut at another place give another hash.
+    /// Reads a regular file that no light depends on.
+    pub fn read_for_pictures(&mut self, path: &Path) -> io::Result<Vec<u8>> {
+        let bytes = read_file(path)?;
+        update(self.pictures.get_or_insert_default(), &bytes);
+        self.bytes += bytes.len() as u64;
+        self.files.push(path.to_owned());
+        Ok(bytes)
+    }
+
+    /// Adds bytes to the hash.
     pub fn add(&mut self, bytes: &[u8]) {
-        self.hasher.update(&(bytes.len() as u64).to_le_bytes());
-        self.hasher.update(bytes);
+        update(&mut self.hasher, bytes);
         self.bytes += bytes.len() as u64;
     }
 
@@ -51,6 +62,17 @@ impl Inputs {
     pub fn finish(&self) -> String {
         self.hasher.finalize().to_hex().to_string()
     }
+
+    /// The same of the files that only pictures show. `None` without such files.
+    pub fn finish_pictures(&self) -> Option<String> {
+        self.pictures.as_ref().map(|hasher| hasher.finalize().to_hex().to_string())
+    }
+}
+
+/// Adds bytes with their length before them, so that inputs cut at another place give another hash.
+fn update(hasher: &mut blake3::Hasher, bytes: &[u8]) {
+    hasher.update(&(bytes.len() as u64).to_le_bytes());
+    hasher.update(bytes);
 }
 
 /// Base64 that accepts missing padding and stray low bits. Exporters differ in both, and neither changes the data.

@@ -32,14 +32,22 @@ impl SceneOrigin<'_> {
     }
 }
 
+/// The lights of a scene.
+#[derive(Default)]
+pub(super) struct Lights {
+    pub lights: Vec<PunctualLight>,
+    /// How many are brighter than [`LIGHT_MAX`], and clamped to it.
+    pub clamped: u64,
+}
+
 /// The lights of the visible nodes (`KHR_lights_punctual`).
 pub(super) fn lights(
     document: &Document,
     nodes: &Nodes,
     origin: &SceneOrigin,
     warnings: &mut Vec<String>,
-) -> Result<Vec<PunctualLight>, SceneError> {
-    let mut lights = Vec::new();
+) -> Result<Lights, SceneError> {
+    let Lights { mut lights, mut clamped } = Lights::default();
     for &index in &nodes.visible {
         let node = &document.nodes[index];
         let Some(reference) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) else { continue };
@@ -51,13 +59,18 @@ pub(super) fn lights(
             return Err(document.invalid(place, "it is infinitely far from the scene", "move it closer"));
         }
         let direction = (nodes.orientations[index] * DVec3::NEG_Z).normalize_or(DVec3::NEG_Z).as_vec3();
-        let intensity = intensity(document, light, &place, warnings)?;
+        let mut intensity = intensity(document, light, &place, warnings)?;
+        if intensity.max_element() > LIGHT_MAX {
+            warnings.push(format!("{place}: its color × intensity exceeds {LIGHT_MAX:e} and is clamped to that"));
+            intensity = intensity.min(Vec3::splat(LIGHT_MAX));
+            clamped += 1;
+        }
         let Some(kind) = kind(document, light, direction, position, &place, warnings)? else { continue };
         let name = node.name.as_deref().or(light.name.as_deref());
         let name = name.map_or_else(|| format!("light {}", lights.len()), short);
         lights.push(PunctualLight { name, kind, intensity });
     }
-    Ok(lights)
+    Ok(Lights { lights, clamped })
 }
 
 /// Colour × intensity. Neither may be negative: each alone becomes 0, because the product of two would be light.
@@ -73,11 +86,7 @@ fn intensity(document: &Document, light: &Light, place: &str, warnings: &mut Vec
     if color.min_element() < 0.0 {
         warnings.push(format!("{place}: negative channels of its color {color} are set to 0"));
     }
-    let light = color.max(Vec3::ZERO) * intensity.max(0.0);
-    if light.max_element() > LIGHT_MAX {
-        warnings.push(format!("{place}: its color × intensity exceeds {LIGHT_MAX:e} and is clamped to that"));
-    }
-    Ok(light.min(Vec3::splat(LIGHT_MAX)))
+    Ok(color.max(Vec3::ZERO) * intensity.max(0.0))
 }
 
 /// The light's kind, or `None` for a spot light without a cone.
@@ -135,17 +144,24 @@ pub(super) fn cameras(
     nodes: &Nodes,
     origin: &SceneOrigin,
     warnings: &mut Vec<String>,
-) -> Result<Vec<Camera>, SceneError> {
+) -> Vec<Camera> {
     let mut cameras: Vec<Camera> = Vec::new();
     let mut taken = HashSet::new();
     for &index in &nodes.visible {
         let node = &document.nodes[index];
         let Some(camera_index) = node.camera else { continue };
-        let definition = document.get(&document.cameras, "camera", camera_index, &node_label(document, index))?;
+        let definition = document.parse_at(&document.cameras, "camera", camera_index, &node_label(document, index));
+        let definition = match definition {
+            Ok(definition) => definition,
+            Err(fault) => {
+                warnings.push(format!("a camera is left out: {}", fault.in_file()));
+                continue;
+            }
+        };
         let pose = nodes.placements[index].relative_to(origin.landmark);
         let position = origin.position(&pose);
         let frame = frame(&nodes.orientations[index]).filter(|_| position.is_finite());
-        let (Some(world_from_camera), Some(projection)) = (frame, projection(definition)) else {
+        let (Some(world_from_camera), Some(projection)) = (frame, projection(&definition)) else {
             let place = label("camera", camera_index.value(), definition.name.as_deref());
             warnings.push(format!("{place} is left out: its projection or its node's transform is not valid"));
             continue;
@@ -154,7 +170,7 @@ pub(super) fn cameras(
         let name = unique(name.map_or_else(|| cameras.len().to_string(), |name| short(name)), &mut taken);
         cameras.push(Camera { name, position, world_from_camera, projection });
     }
-    Ok(cameras)
+    cameras
 }
 
 /// The name itself if it is free, or the first free one of `name#2`, `name#3`, ….

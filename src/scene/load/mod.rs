@@ -6,6 +6,7 @@
 mod accessor;
 mod buffers;
 mod container;
+mod coordinates;
 mod coplanar;
 mod document;
 mod draws;
@@ -15,6 +16,7 @@ mod flatten;
 mod image;
 mod inputs;
 mod lights;
+mod material;
 mod materials;
 mod nodes;
 mod places;
@@ -26,6 +28,8 @@ mod textures;
 mod transform;
 
 use std::path::Path;
+
+use glam::Vec3;
 
 use self::buffers::Buffers;
 use self::document::Document;
@@ -39,8 +43,9 @@ use self::primitive::Skipped;
 use self::textures::Textures;
 use self::transform::world_point;
 use super::error::SceneError;
+use super::light::LIGHT_MAX;
 use super::options::LoadOptions;
-use super::{DroppedTriangles, Material, Scene};
+use super::{DroppedTriangles, Environment, Material, Scene};
 
 /// Loads a `.gltf` or `.glb` file with its buffers, its images and the sky.
 ///
@@ -66,7 +71,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
     let document = Document::parse(path, &bytes[parts.json], &mut warnings)?;
     let buffers = Buffers::load(&document, parts.bin.map(|bin| &bytes[bin]), &mut inputs)?;
     let nodes = Nodes::build(&document, options.scene, &mut warnings)?;
-    let draws = Draws::collect(&document, &buffers, &nodes)?;
+    let mut draws = Draws::collect(&document, &buffers, &nodes, options.detail.normal_maps)?;
     report_skipped(&draws.skipped, !draws.skeletons.is_empty(), &mut warnings);
     let empty = |what: String| SceneError::Empty { file: path.to_owned(), what };
     let Some(landmark) = draws.landmark() else {
@@ -74,7 +79,8 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
     };
 
     let mut textures = Textures::new(&document, &buffers, &mut inputs, options.collapse_constant_images);
-    let materials = Materials::load(&document, &draws, &mut textures, &mut warnings)?;
+    let materials = Materials::load(&document, &draws, &mut textures, options, &mut warnings)?;
+    coordinates::check(&mut draws, &materials, &textures.constant, &mut warnings)?;
     let textures = textures.textures;
     let Flattened { mut mesh, centre, dropped } = flatten(&draws, &landmark, &materials);
     report_dropped(&dropped, &mut warnings);
@@ -91,8 +97,10 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
 
     let origin = SceneOrigin { landmark: &landmark, centre };
     let lights = lights::lights(&document, &nodes, &origin, &mut warnings)?;
-    let cameras = lights::cameras(&document, &nodes, &origin, &mut warnings)?;
-    let environment = environment::load(options, &mut inputs, &mut warnings)?;
+    let cameras = lights::cameras(&document, &nodes, &origin, &mut warnings);
+    let mut environment = environment::load(options, &mut inputs, &mut warnings)?;
+    let light_clamped = lights.clamped + materials.light_clamped + bound_sky(&mut environment, &mut warnings);
+    let lights = lights.lights;
     if lights.is_empty() && environment.is_black() && !materials.materials.iter().any(Material::emits) {
         warnings.push("nothing in the scene sends out light; give it a sky with --env 1,1,1".to_owned());
     }
@@ -105,11 +113,34 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
         lights,
         cameras,
         environment,
+        unassigned: materials.unassigned,
         blake3: inputs.finish(),
+        pictures_blake3: inputs.finish_pictures(),
         files: inputs.files,
         warnings,
         dropped,
+        light_clamped,
     })
+}
+
+/// Clamps a sky to [`LIGHT_MAX`]; the number of texels that exceeded it.
+fn bound_sky(environment: &mut Environment, warnings: &mut Vec<String>) -> u64 {
+    let texels = match environment {
+        Environment::None => return 0,
+        Environment::Constant(radiance) => std::slice::from_mut(radiance),
+        Environment::Map(map) => &mut map.texels,
+    };
+    let mut clamped = 0;
+    for texel in texels {
+        if texel.max_element() > LIGHT_MAX {
+            *texel = texel.min(Vec3::splat(LIGHT_MAX));
+            clamped += 1;
+        }
+    }
+    if clamped > 0 {
+        warnings.push(format!("{clamped} texels of the sky exceed {LIGHT_MAX:e} and are clamped to that"));
+    }
+    clamped
 }
 
 fn report_skipped(skipped: &Skipped, has_skins: bool, warnings: &mut Vec<String>) {

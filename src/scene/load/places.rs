@@ -28,7 +28,7 @@ pub(super) fn skeleton(
     node: usize,
     skin: Index<gltf::json::Skin>,
 ) -> Result<Vec<Placement>, SceneError> {
-    let definition = document.get(&document.skins, "skin", skin, &node_label(document, node))?;
+    let definition = document.parse_at(&document.skins, "skin", skin, &node_label(document, node))?;
     let place = label("skin", skin.value(), definition.name.as_deref());
     if definition.joints.is_empty() {
         return Err(document.invalid(place, "it has no joints", RE_EXPORT));

@@ -10,14 +10,19 @@ use super::document::Document;
 use super::extensions::remedy;
 use super::text::label;
 use crate::scene::error::{RE_EXPORT, SceneError};
+use crate::scene::light::LIGHT_MAX;
 
 /// One primitive in its own space. Each list of an attribute is as long as `positions`, or empty if the file has none.
 pub(super) struct Primitive {
-    /// glTF material; `None` is glTF's default material.
+    /// glTF mesh.
+    pub mesh: usize,
+    /// glTF material; `None` if the primitive has none.
     pub material: Option<usize>,
     pub positions: Vec<DVec3>,
     pub normals: Vec<Vec3>,
     pub uvs: [Vec<Vec2>; 2],
+    /// What is wrong with texture coordinates that could not be read. It counts if a texture wants them.
+    pub uv_faults: [Option<SceneError>; 2],
     pub colors: Vec<Vec4>,
     pub tangents: Vec<Vec4>,
     /// Four pairs of joint and weight per vertex.
@@ -47,6 +52,7 @@ pub(super) struct MeshSize {
 
 /// A primitive with triangles. Its accessors are checked, but nothing is decoded yet.
 struct Opened<'a> {
+    mesh: usize,
     definition: &'a Definition,
     mode: Mode,
     positions: Accessor<'a>,
@@ -71,17 +77,18 @@ pub(super) fn mesh_size(
     Ok(size)
 }
 
-/// Decodes the primitives of a mesh that have triangles.
+/// Decodes the primitives of a mesh that have triangles; their tangents only if `tangents` asks for them.
 pub(super) fn read(
     document: &Document,
     buffers: &Buffers,
     index: usize,
     mesh: &Mesh,
+    tangents: bool,
     skipped: &mut Skipped,
 ) -> Result<Vec<Primitive>, SceneError> {
     open(document, buffers, index, mesh, skipped)?
         .into_iter()
-        .map(|opened| opened.decode(document, buffers, skipped))
+        .map(|opened| opened.decode(document, buffers, tangents, skipped))
         .collect()
 }
 
@@ -113,7 +120,7 @@ fn open<'a>(
             Some(indices) => Some(Accessor::resolve(document, buffers, indices, &format!("{place}: indices"))?),
             None => None,
         };
-        opened.push(Opened { definition, mode, positions, indices, place });
+        opened.push(Opened { mesh: index, definition, mode, positions, indices, place });
     }
     Ok(opened)
 }
@@ -136,7 +143,13 @@ fn refuse_draco(document: &Document, definition: &Definition, place: &str) -> Re
 }
 
 impl Opened<'_> {
-    fn decode(self, document: &Document, buffers: &Buffers, skipped: &mut Skipped) -> Result<Primitive, SceneError> {
+    fn decode(
+        self,
+        document: &Document,
+        buffers: &Buffers,
+        tangents: bool,
+        skipped: &mut Skipped,
+    ) -> Result<Primitive, SceneError> {
         let count = self.positions.count;
         let attribute = |semantic: Semantic, components: &[usize]| -> Result<Option<Accessor>, SceneError> {
             let Some(&index) = self.definition.attributes.get(&Checked::Valid(semantic.clone())) else {
@@ -148,16 +161,21 @@ impl Opened<'_> {
             accessor.expect_count(document, count, "POSITION")?;
             Ok(Some(accessor))
         };
-        let uvs = |set| -> Result<Vec<Vec2>, SceneError> {
-            let uvs = attribute(Semantic::TexCoords(set), &[2])?.map(|a| a.floats([0.0; 2], false));
-            Ok(uvs.into_iter().flatten().map(|uv| finite_or_zero(&uv, Vec2::from_array(uv))).collect())
+        let uvs = |set| -> (Vec<Vec2>, Option<SceneError>) {
+            let uv = |uv: [f32; 2]| finite_or_zero(&uv, Vec2::from_array(uv));
+            match attribute(Semantic::TexCoords(set), &[2]) {
+                Ok(uvs) => (uvs.into_iter().flat_map(|a| a.floats([0.0; 2], false)).map(uv).collect(), None),
+                Err(fault) => (Vec::new(), Some(fault)),
+            }
         };
+        let ((uvs_0, fault_0), (uvs_1, fault_1)) = (uvs(0), uvs(1));
         let normals = attribute(Semantic::Normals, &[3])?.map(|a| a.floats([0.0; 3], false));
-        let tangents = attribute(Semantic::Tangents, &[4])?.map(|a| a.floats([0.0; 4], false));
+        let tangents = if tangents { attribute(Semantic::Tangents, &[4])? } else { None };
+        let tangents = tangents.map(|a| a.floats([0.0; 4], false));
         // Colours without alpha are opaque. A colour with a NaN is replaced by white.
         let colors = attribute(Semantic::Colors(0), &[3, 4])?.map(|a| a.floats([0.0, 0.0, 0.0, 1.0], true));
         let color = |c: [f32; 4]| match c.iter().all(|x| x.is_finite()) {
-            true => Vec4::from_array(c).max(Vec4::ZERO).min(Vec4::new(f32::MAX, f32::MAX, f32::MAX, 1.0)),
+            true => Vec4::from_array(c).max(Vec4::ZERO).min(Vec3::splat(LIGHT_MAX).extend(1.0)),
             false => Vec4::ONE,
         };
         let joints = attribute(Semantic::Joints(0), &[4])?.and_then(|a| a.integers::<4>());
@@ -167,9 +185,11 @@ impl Opened<'_> {
             usize::from(self.definition.attributes.contains_key(&Checked::Valid(Semantic::Joints(1))));
         skipped.morph_targets += usize::from(self.definition.targets.as_ref().is_some_and(|t| !t.is_empty()));
         Ok(Primitive {
+            mesh: self.mesh,
             material: self.definition.material.map(|m| m.value()),
             normals: normals.into_iter().flatten().map(|n| finite_or_zero(&n, Vec3::from_array(n))).collect(),
-            uvs: [uvs(0)?, uvs(1)?],
+            uvs: [uvs_0, uvs_1],
+            uv_faults: [fault_0, fault_1],
             colors: colors.into_iter().flatten().map(color).collect(),
             tangents: tangents.into_iter().flatten().map(|t| finite_or_zero(&t, Vec4::from_array(t))).collect(),
             influences: influences.map(|(j, w)| [0, 1, 2, 3].map(|i| (j[i], w[i]))).collect(),

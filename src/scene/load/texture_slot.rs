@@ -28,11 +28,12 @@ impl From<&Info> for Slot {
 }
 
 impl Slot {
-    /// The slot of a normal texture. Its transform is parsed here, because `gltf::json` does not parse it.
-    pub fn from_normal(document: &Document, normal: &NormalTexture, place: &str) -> Result<Slot, SceneError> {
+    /// The slot of a normal texture with its scale. Its transform is parsed here, because `gltf::json` does not parse it.
+    pub fn of_normal(document: &Document, normal: &Value, place: &str) -> Result<(Slot, f32), SceneError> {
+        let normal: NormalTexture = parse(document, normal, "normalTexture", place)?;
         let extension = normal.extensions.as_ref().and_then(|e| e.others.get("KHR_texture_transform"));
         let transform = extension.map(|e| parse(document, e, "normalTexture", place)).transpose()?;
-        Ok(Slot { texture: normal.index, tex_coord: normal.tex_coord, transform })
+        Ok((Slot { texture: normal.index, tex_coord: normal.tex_coord, transform }, normal.scale))
     }
 
     /// Loads the texture. `place` names material and slot in messages.
@@ -56,7 +57,7 @@ impl Slot {
     }
 }
 
-/// The texture slot under `key` of an extension that `gltf::json` does not parse.
+/// The texture slot under `key` of a material, of its parameters or of an extension.
 pub(super) fn slot(document: &Document, object: &Value, key: &str, place: &str) -> Result<Option<Slot>, SceneError> {
     let info = object.get(key).map(|value| parse::<Info>(document, value, key, place)).transpose()?;
     Ok(info.as_ref().map(Slot::from))

@@ -25,10 +25,14 @@ pub(super) struct Textures<'a> {
     budget: Budget,
     /// Contents of image files by image index. A file is read once even if it is decoded twice.
     files: HashMap<usize, Vec<u8>>,
+    /// Whether what is loaded now is for pictures alone: it stays out of the scene's hash.
+    pub for_pictures: bool,
     loaded: HashMap<Key, TextureIndex>,
     pub textures: Vec<Texture>,
     /// Least alpha of each texture.
     pub least_alpha: Vec<f32>,
+    /// Whether all texels of a texture are equal.
+    pub constant: Vec<bool>,
 }
 
 /// Uses of an image that are equal in these four share one texture.
@@ -54,24 +58,27 @@ impl<'a> Textures<'a> {
             collapse_constant,
             budget: Budget::new(),
             files: HashMap::new(),
+            for_pictures: false,
             loaded: HashMap::new(),
             textures: Vec::new(),
             least_alpha: Vec::new(),
+            constant: Vec::new(),
         }
     }
 
     /// Loads a texture as colours (`srgb`) or as data. `place` names the material slot in messages.
     pub fn load(&mut self, texture: Index<Definition>, srgb: bool, place: &str) -> Result<TextureIndex, SceneError> {
-        let definition = self.document.get(&self.document.textures, "texture", texture, &place)?;
+        let definition = self.document.parse_at(&self.document.textures, "texture", texture, &place)?;
         let place = format!("{place}: {}", label("texture", texture.value(), definition.name.as_deref()));
-        let image = self.image_of(definition, &place)?;
-        let (wrap, nearest) = self.sampling(definition, &place)?;
+        let image = self.image_of(&definition, &place)?;
+        let (wrap, nearest) = self.sampling(&definition, &place)?;
         let key = Key { image: image.value(), wrap, nearest, srgb };
         if let Some(index) = self.loaded.get(&key) {
             return Ok(*index);
         }
         let Decoded { mut width, mut height, mut texels } = self.decode(image, srgb, &place)?;
-        if self.collapse_constant && is_constant(&texels) {
+        let is_constant = is_constant(&texels);
+        if self.collapse_constant && is_constant {
             let bytes = match &mut texels {
                 Texels::Rgba8 { data, .. } => {
                     data.truncate(1);
@@ -88,6 +95,7 @@ impl<'a> Textures<'a> {
             (width, height) = (1, 1);
         }
         let index = TextureIndex(self.textures.len() as u32);
+        self.constant.push(is_constant);
         self.least_alpha.push(least_alpha(&texels));
         self.textures.push(Texture { width, height, wrap, nearest, texels });
         self.loaded.insert(key, index);
@@ -118,10 +126,9 @@ impl<'a> Textures<'a> {
     }
 
     fn sampling(&self, definition: &Definition, place: &str) -> Result<([Wrap; 2], bool), SceneError> {
-        let default = Sampler::default();
         let sampler = match definition.sampler {
-            Some(index) => self.document.get(&self.document.samplers, "sampler", index, &place)?,
-            None => &default,
+            Some(index) => self.document.parse_at(&self.document.samplers, "sampler", index, &place)?,
+            None => Sampler::default(),
         };
         let wrap = |mode: &Checked<WrappingMode>| match mode {
             Checked::Valid(WrappingMode::Repeat) => Ok(Wrap::Repeat),
@@ -138,7 +145,7 @@ impl<'a> Textures<'a> {
     fn decode(&mut self, index: Index<Image>, srgb: bool, place: &str) -> Result<Decoded, SceneError> {
         const REMEDY: &str = "give a PNG or JPEG image";
         let document = self.document;
-        let image = document.get(&document.images, "image", index, &place)?;
+        let image = document.parse_at(&document.images, "image", index, &place)?;
         let uri = image.uri.as_deref().filter(|uri| !uri.starts_with("data:"));
         let name = image.name.as_deref().or(uri);
         let place = format!("{place}: {}", label("image", index.value(), name));
@@ -153,7 +160,8 @@ impl<'a> Textures<'a> {
                 }
                 Ok(Resource::File(path)) => {
                     if !self.files.contains_key(&index.value()) {
-                        let bytes = self.inputs.read(&path).map_err(|cause| SceneError::Read {
+                        let read = if self.for_pictures { Inputs::read_for_pictures } else { Inputs::read };
+                        let bytes = read(self.inputs, &path).map_err(|cause| SceneError::Read {
                             file: document.file.clone(),
                             place: format!("{place} ({})", path.display()),
                             cause,

@@ -52,7 +52,14 @@ pub fn every_file_renders_or_is_refused() {
         let arguments =
             ["render", scene, text(&probes), "-o", text(&pictures), "--size", "64x36", "--env", "1,1,1", "--json"];
         let report = limited(&arguments);
-        assert_eq!(report.code, Some(0), "{scene}: {}", report.stderr);
+        if report.code != Some(0) {
+            // A fault in what only pictures show, such as a normal map.
+            let message = one_error(&report);
+            assert!(message.contains(scene) && message.contains("normalTexture"), "{scene}: {message}");
+            assert!(!pictures.exists(), "{scene}");
+            refused += 1;
+            continue;
+        }
         let peak = report.json()["peak_memory_bytes"].as_u64().unwrap();
         assert!(peak < MOST_MEMORY, "{scene}: {peak} bytes");
         rendered += 1;

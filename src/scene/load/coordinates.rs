@@ -46,7 +46,7 @@ pub(super) fn check(
             n => format!("{n} meshes lack"),
         };
         warnings.push(format!(
-            "{count} texture coordinates that the material wants, and shows the texel at coordinates 0 everywhere: \
+            "{count} texture coordinates that a material wants, which count as 0: \
              {}{more}; unwrap and export again",
             named.join(", ")
         ));

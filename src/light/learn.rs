@@ -35,6 +35,9 @@ const COSINE_RAYS: usize = 16;
 /// is even over all groups. It bounds the noise where few rays have learnt something wrong.
 const DEFENSIVE: f64 = 0.05;
 
+/// Light counts as even if the darkest side has at least this share of the brightest.
+const EVEN: f32 = 0.8;
+
 /// The shares of cosine-distributed samples that are tried.
 const COSINE_SHARES: [f32; 5] = [0.125, 0.25, 0.5, 0.75, 0.875];
 
@@ -110,6 +113,7 @@ impl World<'_> {
                 found.extend(self.test_group(group, &points[(rank + i) % points.len()], random));
             }
         }
+        let towards_emitters = found.len();
         for i in 0..COSINE_RAYS {
             found.extend(self.test_cosine(&points[i % points.len()], random));
         }
@@ -132,7 +136,9 @@ impl World<'_> {
         let weights: Vec<f64> = (0..groups).map(weight).collect();
         let mut shares = Shares::new(&weights);
         shares.lit = lit;
-        shares.cosine = if self.emitters.is_uniform_sky() { 1.0 } else { best_cosine_share(&shares, &found, all) };
+        let irradiance: f32 = found.iter().map(|f| f.light / all(f)).sum();
+        let all_even = self.emitters.is_uniform_sky() || is_even(&found[towards_emitters..], irradiance);
+        shares.cosine = if all_even { 1.0 } else { best_cosine_share(&shares, &found, all) };
         shares
     }
 
@@ -167,6 +173,14 @@ fn density_of_test(receiver: &Receiver, direction: Vec3) -> f32 {
     } else {
         UNIFORM_SPHERE_DENSITY
     }
+}
+
+/// Whether about the same light arrives from all sides. Rays towards emitters then only add noise.
+fn is_even(by_cosine: &[Found], irradiance: f32) -> bool {
+    let values = || by_cosine.iter().map(|f| f.light / f.by_cosine);
+    let (least, most) = (values().fold(f32::INFINITY, f32::min), values().fold(0.0, f32::max));
+    // What is bright and small the rays towards it have found; it then outweighs what these have.
+    by_cosine.len() == COSINE_RAYS && least >= EVEN * most && irradiance <= most / EVEN
 }
 
 /// The share of cosine-distributed samples at which the mixture of both techniques has the least second moment.

@@ -128,7 +128,8 @@ impl World<'_> {
         let shares = self.shares_at(point);
         let emitter_rays = match settings.strategy {
             Strategy::LightOnly => 1.0,
-            _ if self.emitters.is_uniform_sky() => 0.0,
+            // Light is even: the path's own rays have no noise.
+            _ if shares.cosine >= 1.0 => 0.0,
             _ if !shares.lit => LEAST_EMITTER_RAYS,
             _ => (2.0 * (1.0 - shares.cosine)).clamp(LEAST_EMITTER_RAYS, 1.0),
         };

@@ -141,6 +141,9 @@ impl Capture<'_, '_> {
         let mut random = Random::new(self.seed, Purpose::Places, index as u64, 1);
         let emitters = &self.world.emitters;
         let shares = self.world.learn(&[receiver], |group| emitters.is_found_by_rays(group), &mut random);
+        if shares.cosine >= 1.0 {
+            return None;
+        }
         let draws = (0..self.world.emitters.groups()).map(|group| {
             let expected = samples as f32 * shares.of(group);
             let count = (expected + random.uniform()) as u32;

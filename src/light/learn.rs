@@ -27,9 +27,9 @@ const TRIES: usize = 4;
 const TESTED: usize = 32;
 
 /// Rays towards emitters in all, as far as [`RAYS_PER_GROUP`] allows, and cosine-distributed rays.
-const LIGHT_RAYS: usize = 64;
-const RAYS_PER_GROUP: [usize; 2] = [2, 8];
-const COSINE_RAYS: usize = 16;
+const LIGHT_RAYS: usize = 96;
+const RAYS_PER_GROUP: [usize; 2] = [3, 16];
+const COSINE_RAYS: usize = 32;
 
 /// Share of draws that does not follow what was learnt: half of it follows what may arrive if nothing occludes it, half
 /// is even over all groups. It bounds the noise where few rays have learnt something wrong.

@@ -11,7 +11,7 @@ use super::surface::SurfacePoint;
 use crate::scene::Scene;
 
 /// About how many cells the scene's box has.
-const CELLS: f64 = 8192.0;
+const CELLS: f64 = 4096.0;
 
 /// All places of a scene.
 pub struct Places {

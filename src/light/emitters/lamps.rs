@@ -4,9 +4,10 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
+use super::bounds::LightBounds;
 use super::cone::Cone;
 use super::receiver::Receiver;
-use super::tree::{LightBounds, LightTree};
+use super::tree::LightTree;
 use crate::math::color::luminance;
 use crate::scene::{LightKind, PunctualLight};
 

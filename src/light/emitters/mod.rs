@@ -7,6 +7,7 @@
 //! Multiple importance sampling needs two functions: one draws a sample, the other gives the density of samples along a
 //! given ray. Both stand here together.
 
+mod bounds;
 mod cone;
 mod lamps;
 pub mod receiver;
@@ -254,4 +255,8 @@ impl Emitters {
 }
 
 #[cfg(test)]
+mod made;
+#[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tree_tests;

@@ -9,8 +9,8 @@ use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
 
+use super::bounds::LightBounds;
 use super::cone::Cone;
-use super::tree::LightBounds;
 use crate::math::color::luminance;
 use crate::math::sampling::triangle_barycentric;
 use crate::scene::range::TextureRange;

@@ -304,22 +304,16 @@ impl Grid {
     /// The eight corners of the cell of a point: bit 0 of a corner's number is +x, bit 1 is +y, bit 2 is +z.
     #[inline]
     pub fn corners_around(&self, cell: &Cell) -> [ProbeIndex; 8] {
-        self.corners_from(cell.base)
+        // From a corner to the next along each axis; none where there is a single layer.
+        let layered = self.divisions.min(UVec3::splat(2)) - UVec3::ONE;
+        let UVec3 { x, y, z } = layered * UVec3::new(1, self.divisions.x, self.divisions.x * self.divisions.y);
+        let (lowest, steps) = (self.index(cell.base).0, [[0, x], [0, y], [0, z]]);
+        std::array::from_fn(|i| ProbeIndex(lowest + steps[0][i & 1] + steps[1][i >> 1 & 1] + steps[2][i >> 2]))
     }
 
     /// The eight corners of a cell, in the same order.
     pub fn corners(&self, cell: CellIndex) -> [ProbeIndex; 8] {
-        self.corners_from(self.base(cell))
-    }
-
-    #[inline]
-    fn corners_from(&self, base: UVec3) -> [ProbeIndex; 8] {
-        let ProbeIndex(lowest) = self.index(base);
-        // From a corner to the next along each axis; none where there is a single layer.
-        let layered = self.divisions.min(UVec3::splat(2)) - UVec3::ONE;
-        let UVec3 { x, y, z } = layered * UVec3::new(1, self.divisions.x, self.divisions.x * self.divisions.y);
-        let step = |i: u32, bit: u32, along: u32| if i >> bit & 1 == 1 { along } else { 0 };
-        std::array::from_fn(|i| i as u32).map(|i| ProbeIndex(lowest + step(i, 0, x) + step(i, 1, y) + step(i, 2, z)))
+        self.corners_around(&Cell { base: self.base(cell), fraction: Vec3::ZERO })
     }
 
     /// A point in units of a cell: the cell is the unit box.

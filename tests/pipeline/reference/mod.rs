@@ -14,6 +14,7 @@ mod furnace;
 mod gltf;
 mod lights;
 mod program;
+mod rooms;
 mod skies;
 
 use std::path::Path;

@@ -26,13 +26,16 @@ const TRIES: usize = 4;
 /// Groups that a place sends rays to: those that may send most light.
 const TESTED: usize = 32;
 
-/// Rays towards emitters in all, as far as [`RAYS_PER_GROUP`] allows, and cosine-distributed rays.
+/// Rays towards emitters in all, as far as [`RAYS_PER_GROUP`] allows, and cosine-distributed rays. With 64, 2 to 8 and 16,
+/// `reference` in office needed 1.3 × (2,048 cells) and 1.5 × (8,192) the time for the same noise; courtyard, bathroom and
+/// veach_ajar differed by at most 10 %.
 const LIGHT_RAYS: usize = 96;
 const RAYS_PER_GROUP: [usize; 2] = [3, 16];
 const COSINE_RAYS: usize = 32;
 
 /// Share of draws that does not follow what was learnt: half of it follows what may arrive if nothing occludes it, half
-/// is even over all groups. It bounds the noise where few rays have learnt something wrong.
+/// is even over all groups. It bounds the noise where few rays have learnt something wrong, and costs draws: four samples
+/// in a room beside others have a noise of 0.11 instead of 0.04.
 const DEFENSIVE: f64 = 0.05;
 
 /// Light counts as even if the darkest side has at least this share of the brightest.

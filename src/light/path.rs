@@ -72,7 +72,8 @@ const PAIR_EMITTER: u32 = 4;
 const PAIR_WHETHER_EMITTER: u32 = 6;
 
 /// Least probability of a ray towards an emitter. A place that was not seen to be lit, or that is lit from so many
-/// directions that the path's own ray finds the light, has little use for more.
+/// directions that the path's own ray finds the light, has little use for more. Light that the place has missed then has at
+/// most four times its weight.
 const LEAST_EMITTER_RAYS: f32 = 0.25;
 
 impl World<'_> {

@@ -10,7 +10,8 @@ use super::emitters::shares::Shares;
 use super::surface::SurfacePoint;
 use crate::scene::Scene;
 
-/// About how many cells the scene's box has.
+/// About how many cells the scene's box has. Between 2,048 and 8,192, with the same rays, the noise of `reference` in a
+/// hundred closed rooms differed by 4 %, in office by 16 % (less with fewer).
 const CELLS: f64 = 4096.0;
 
 /// All places of a scene.

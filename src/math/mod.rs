@@ -9,5 +9,6 @@ pub mod octahedral;
 pub mod offset;
 pub mod primaries;
 pub mod random;
+pub mod ranked;
 pub mod sampling;
 pub mod statistics;

@@ -7,13 +7,13 @@
 //! Draws begin at one of the [`LightTree::groups`]: subtrees that are disjoint and hold all lights. Which group is drawn
 //! from is decided elsewhere, by what can reach the point.
 
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use glam::Vec3;
 
 use super::bounds::{LightBounds, halve, split};
 use super::receiver::Receiver;
+use crate::math::ranked::Ranked;
 
 /// Most groups. Their shares at a place take 4 bytes each.
 const MOST_GROUPS: usize = 128;
@@ -112,18 +112,19 @@ impl LightTree {
         let candidate = |node: u32| {
             let found = bounds[node as usize];
             let weight = found.map_or(0.0, |b| b.diagonal() * b.power.sqrt().sqrt());
-            Candidate { weight: if self.nodes[node as usize].is_light { -1.0 } else { weight }, node }
+            let weight = if self.nodes[node as usize].is_light { -1.0 } else { weight };
+            Ranked { weight, number: node, item: () }
         };
         let mut heap = BinaryHeap::from([candidate(0)]);
         while heap.len() < MOST_GROUPS
-            && let Some(Candidate { weight, node }) = heap.peek().copied()
+            && let Some(Ranked { weight, number: node, .. }) = heap.peek().copied()
             && weight >= 0.0
         {
             heap.pop();
             let first = self.nodes[node as usize].index;
             heap.extend([candidate(first), candidate(first + 1)]);
         }
-        self.groups = heap.into_iter().map(|c| c.node).collect();
+        self.groups = heap.into_iter().map(|c| c.number).collect();
         // Neighbours in the tree are neighbours in the list.
         self.groups.sort_unstable();
     }
@@ -195,32 +196,6 @@ impl LightTree {
         let share = first / (first + second);
         // 0/0 where neither can reach the receiver.
         (!share.is_nan()).then_some(share)
-    }
-}
-
-#[derive(Clone, Copy)]
-struct Candidate {
-    weight: f32,
-    node: u32,
-}
-
-impl PartialEq for Candidate {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Candidate {}
-
-impl PartialOrd for Candidate {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Candidate {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.weight.total_cmp(&other.weight).then(other.node.cmp(&self.node))
     }
 }
 

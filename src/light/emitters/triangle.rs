@@ -3,7 +3,6 @@
 //! A triangle whose emission varies is divided into pieces, each an emitter of its own: the pieces that a bright spot
 //! lies in become small, and those that are black are left out.
 
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::f32::consts::PI;
 
@@ -12,6 +11,7 @@ use glam::{Vec2, Vec3};
 use super::bounds::LightBounds;
 use super::cone::Cone;
 use crate::math::color::luminance;
+use crate::math::ranked::Ranked;
 use crate::math::sampling::triangle_barycentric;
 use crate::scene::range::TextureRange;
 use crate::scene::{Scene, TriangleIndex};
@@ -183,8 +183,6 @@ pub struct Pieces {
 
 /// A piece that may be divided.
 struct Candidate {
-    /// (largest emission − mean) × area.
-    excess: f32,
     piece: Piece,
     lookup: usize,
     is_uneven: bool,
@@ -220,11 +218,13 @@ impl Pieces {
             let found = ranges.emission(scene, index, &piece.corners());
             let area = area * piece.edges[0].perp_dot(piece.edges[1]).abs();
             let is_uneven = !found.is_smallest && found.most > UNEVEN * found.mean;
-            Candidate { excess: (found.most - found.mean) * area, piece, lookup, is_uneven, most: found.most }
+            let item = Candidate { piece, lookup, is_uneven, most: found.most };
+            // The next to be divided is where most is gained.
+            Ranked { weight: (found.most - found.mean) * area, number: lookup as u32, item }
         };
         let mut open = BinaryHeap::from([candidate(Piece::WHOLE, root, ranges)]);
         let mut done = Vec::new();
-        while let Some(next) = open.pop() {
+        while let Some(Ranked { item: next, .. }) = open.pop() {
             let pieces = open.len() + done.len();
             let room = pieces + 4 <= MOST_PIECES && self.all.len() + pieces + 4 <= MOST_PIECES_OF_ALL;
             if !next.is_uneven || !room {
@@ -235,7 +235,7 @@ impl Pieces {
             self.lookups[next.lookup] = Lookup::Quarters(first as u32);
             self.lookups.resize(first + 4, Lookup::None);
             let quarters = next.piece.quarters().into_iter().enumerate();
-            open.extend(quarters.map(|(i, piece)| candidate(piece, first + i, ranges)).filter(|c| c.most > 0.0));
+            open.extend(quarters.map(|(i, piece)| candidate(piece, first + i, ranges)).filter(|c| c.item.most > 0.0));
         }
         for Candidate { piece, lookup, most, .. } in done {
             let emitter = EmissiveTriangle::new(scene, index, piece);
@@ -270,25 +270,5 @@ impl Piece {
     /// Its corners in the triangle's coordinates.
     fn corners(&self) -> [Vec2; 3] {
         [self.corner, self.corner + self.edges[0], self.corner + self.edges[1]]
-    }
-}
-
-impl PartialEq for Candidate {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Candidate {}
-
-impl PartialOrd for Candidate {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Candidate {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.excess.total_cmp(&other.excess).then(other.lookup.cmp(&self.lookup))
     }
 }

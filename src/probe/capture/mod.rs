@@ -140,7 +140,7 @@ impl Capture<'_, '_> {
         let receiver = Receiver::in_space(position);
         let mut random = Random::new(self.seed, Purpose::Places, index as u64, 1);
         let emitters = &self.world.emitters;
-        let shares = self.world.learn(&[receiver], |group| emitters.is_found_by_rays(group), &mut random);
+        let (shares, ..) = self.world.learn(&[receiver], |group| emitters.is_found_by_rays(group), &mut random);
         if shares.cosine >= 1.0 {
             return None;
         }

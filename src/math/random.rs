@@ -22,6 +22,10 @@ pub enum Purpose {
     ProbePaths = 6,
     /// Rays by which places learn which emitters they see.
     Places = 7,
+    /// Points of free air, and their normals.
+    Air = 8,
+    /// Paths from points of free air.
+    AirPaths = 9,
     /// Noise added to a reference, to measure how the reference's own noise changes FLIP.
     FlipReplicate = 16,
 }

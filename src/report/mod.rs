@@ -1,5 +1,6 @@
 //! Figures and pictures for people and machines: reports, tables, false-colour pictures, text in pictures.
 
+pub mod air;
 pub mod bake;
 pub mod baked;
 pub mod colormap;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::air::AirFigures;
 use super::baked::BakedFigures;
 use super::error::Figures;
 use super::header::Header;
@@ -181,8 +182,13 @@ pub struct MethodFigures {
     pub lookup_ns: Option<f64>,
     pub irradiance_indirect_mean: Option<f64>,
     pub leak: Leak,
-    /// `error.rmse` ÷ the reference's mean; `null` where that is 0.
+    pub outside_hull: Option<f64>,
+    pub air: AirFigures,
+    /// `error.nrmse`.
     pub error_relative: Option<f64>,
+    /// `error.by_region.corner.nrmse`, `error.by_region.flat.nrmse`.
+    pub error_corner: Option<f64>,
+    pub error_flat: Option<f64>,
     pub error: Figures,
     /// From the reference's noise.
     pub standard_error: Figures,

@@ -1,17 +1,23 @@
 //! One bake of a sweep, and what it is worth.
 
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use super::SweepError;
 use super::store::{Key, Store, Stored};
 use crate::bake::{Baked, Circumstances, prepare};
 use crate::config::Config;
-use crate::evaluate::{BakedTruth, Comparison, Scenery, Shaded};
+use crate::evaluate::{BakedTruth, Comparison, Scenery, Seen, Shaded};
 use crate::image::Picture;
 use crate::probe::Volume;
 use crate::probe::file::{self, ProbeFile, SceneRecord};
 use crate::probe::query::Query;
+use crate::report::error::{ByRegion, ErrorEstimate};
 use crate::report::sweep::{BakeTimes, MethodFigures, RunRecord, TruthRecord};
+use crate::shade::air::{Air, AirTruth};
 use crate::shade::reference::ReferenceSettings;
 use crate::shade::visibility_modes::VisibilityMode;
 use crate::system::progress::Progress;
@@ -24,9 +30,14 @@ pub struct Setting<'a, 's> {
     pub reference_mean: Option<f64>,
     pub reference_settings: ReferenceSettings,
     pub store: Store,
+    pub truths: Truths,
     /// All that runs depend on besides configuration and seed, as text.
     pub identity: String,
 }
+
+/// Truths in the air that were traced already, by the hash of their points.
+#[derive(Debug, Default)]
+pub struct Truths(RefCell<HashMap<[u8; 32], Arc<AirTruth>>>);
 
 /// A finished run, new or from the store.
 #[derive(Debug, Clone)]
@@ -92,9 +103,13 @@ impl Setting<'_, '_> {
         let file_query = Query { volume: &bake.volume, settings: &config.query };
         let (masks, masks_s) = self.scenery.masks(&file_query);
         let query = Query { volume: &truth.truth.volume, settings: &config.query };
-        let [_, mut on, mut ray] = self.scenery.shade(&query, &masks, masks_s, bake.bytes_per_probe, || {});
+        let air = self.scenery.air(&file_query);
+        let in_air = self.truth_in_air(&air);
+        let seen = Seen { masks: &masks, masks_s, air: &air };
+        let [_, mut on, mut ray] = self.scenery.shade(&query, seen, bake.bytes_per_probe, || {});
         let figures = |shaded: &mut Shaded| {
             shaded.compare(&self.comparison);
+            shaded.compare_in_air(&in_air);
             self.figures(shaded)
         };
         let record = TruthRecord {
@@ -126,9 +141,27 @@ impl Setting<'_, '_> {
     fn shade(&self, config: &Config, bake: &Bake) -> [Shaded; 3] {
         let query = Query { volume: &bake.volume, settings: &config.query };
         let (masks, masks_s) = self.scenery.masks(&query);
-        let mut shaded = self.scenery.shade(&query, &masks, masks_s, bake.bytes_per_probe, || {});
-        shaded.iter_mut().for_each(|s| s.compare(&self.comparison));
+        let air = self.scenery.air(&query);
+        let in_air = self.truth_in_air(&air);
+        let seen = Seen { masks: &masks, masks_s, air: &air };
+        let mut shaded = self.scenery.shade(&query, seen, bake.bytes_per_probe, || {});
+        for s in &mut shaded {
+            s.compare(&self.comparison);
+            s.compare_in_air(&in_air);
+        }
         shaded
+    }
+
+    /// The truth at points of the air. Configurations on the same grid share their points.
+    fn truth_in_air(&self, air: &Air) -> Arc<AirTruth> {
+        let mut hasher = blake3::Hasher::new();
+        for value in air.points.iter().flat_map(|point| [point.position, point.normal]).flat_map(|v| v.to_array()) {
+            hasher.update(&value.to_le_bytes());
+        }
+        let ReferenceSettings { spp, seed, .. } = self.reference_settings;
+        let key = *hasher.finalize().as_bytes();
+        let mut known = self.truths.0.borrow_mut();
+        Arc::clone(known.entry(key).or_insert_with(|| Arc::new(air.truth(self.scenery.world, spp, seed))))
     }
 
     fn record(&self, seed: u64, bake: &Bake, shaded: &[Shaded; 3]) -> RunRecord {
@@ -161,15 +194,19 @@ impl Setting<'_, '_> {
     fn figures(&self, shaded: &Shaded) -> MethodFigures {
         let report = &shaded.report;
         let measured = report.error.as_ref().map(|error| &error.all);
+        let region = |of: fn(&ByRegion) -> &ErrorEstimate| of(&report.error.as_ref()?.by_region).figures.nrmse;
         let error = measured.map(|m| m.figures).unwrap_or_default();
-        let relative = |value: Option<f64>| Some(value? / self.reference_mean?);
         MethodFigures {
             name: report.name.to_owned(),
             shade_ms: report.shade_ms.median,
             lookup_ns: report.lookup_ns,
             irradiance_indirect_mean: report.irradiance_indirect_mean,
             leak: report.leak,
-            error_relative: relative(error.rmse),
+            outside_hull: report.outside_hull,
+            air: report.air,
+            error_relative: error.nrmse,
+            error_corner: region(|regions| &regions.corner),
+            error_flat: region(|regions| &regions.flat),
             error,
             standard_error: measured.map(|m| m.standard_error).unwrap_or_default(),
             verdict: measured.and_then(|m| m.verdict).map(str::to_owned),

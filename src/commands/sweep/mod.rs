@@ -24,7 +24,7 @@ use crate::shade::points::see;
 use crate::shade::reference::ReferenceSettings;
 use crate::shade::regions::regions;
 use crate::sweep::ladder::LadderFile;
-use crate::sweep::run::Setting;
+use crate::sweep::run::{Setting, Truths};
 use crate::sweep::store::Store;
 use crate::system::output::{Named, check_folder, create_folder};
 
@@ -66,7 +66,8 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
     let reference = reference::obtain(args, &world, &camera, &settings, console)?;
     let primary_started = Instant::now();
     let view = see(&world, &camera, args.view.size.width, args.view.size.height, session.seed);
-    let scenery = Scenery { world: &world, view: &view, primary_s: primary_started.elapsed().as_secs_f64() };
+    let primary_s = primary_started.elapsed().as_secs_f64();
+    let scenery = Scenery { world: &world, view: &view, primary_s, seed: session.seed };
     let regions = regions(&world, &view);
     let (mean, standard_error) = reference.layers.means(|i| regions[i].is_some());
     let exposure_ev = reference.layers.beauty.auto_exposure_ev();
@@ -82,6 +83,7 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
         reference_mean: mean.filter(|mean| *mean > 0.0),
         reference_settings: ReferenceSettings { spp: reference.spp, ..settings },
         store: Store::new(&args.output)?,
+        truths: Truths::default(),
         // Times depend on the threads.
         identity: format!("{}spp = {}\nthreads = {}\n", reference.identity.to_text(), reference.spp, session.threads),
     };

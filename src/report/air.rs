@@ -99,13 +99,15 @@ impl AirFigures {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
     use crate::probe::query::QueryPoint;
     use crate::probe::store::surface::Facing;
 
     fn air(masks: &[u8]) -> Air {
         let point = QueryPoint { position: Vec3::ZERO, normal: Vec3::Y, facing: Facing::of(Vec3::Y), view: Vec3::Y };
-        Air { points: vec![point; masks.len()], masks: masks.to_vec() }
+        Air { points: Arc::new(vec![point; masks.len()]), masks: masks.to_vec() }
     }
 
     /// Of Σ Ê = 8: one point is 1 too bright, one loses all of its 4, one sees no probe and does not count.

@@ -18,6 +18,7 @@ pub mod probe_key;
 pub mod reference;
 pub mod reference_layers;
 pub mod render;
+pub mod sheet;
 pub mod sweep;
 pub mod table;
 pub mod ticks;

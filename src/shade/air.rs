@@ -3,6 +3,8 @@
 //! A point counts as inside geometry by the rule of the placement: where more than half of what rays around it meet are
 //! backs of single-sided surfaces. Inside solids of double-sided surfaces nothing tells that, and points there count.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -34,7 +36,7 @@ const MOST_BLOCKS: u32 = 4;
 #[derive(Debug, Clone, Default)]
 pub struct Air {
     /// They ask with their normal, seen from along it. In volumes that are nearly solid they are fewer than [`POINTS`].
-    pub points: Vec<QueryPoint>,
+    pub points: Arc<Vec<QueryPoint>>,
     /// Bit i: whether the segment to the probe of corner i is unblocked, and the probe active.
     pub masks: Vec<u8>,
 }
@@ -51,18 +53,22 @@ pub struct AirTruth {
 }
 
 impl Air {
-    /// The points depend on the seed, the scene and the hull of the volume's probes alone.
+    /// Looks for points and for what they see.
     pub fn new(world: &World, query: &Query, seed: u64) -> Air {
-        let points: Vec<QueryPoint> =
-            (0..POINTS).into_par_iter().filter_map(|index| point(world, query.volume, seed, index)).collect();
+        let points = Arc::new(points(world, query.volume, seed));
+        Air::of(world, query, points)
+    }
+
+    /// Of points that are known.
+    pub fn of(world: &World, query: &Query, points: Arc<Vec<QueryPoint>>) -> Air {
         let masks = masks(world, query, &points);
         Air { points, masks }
     }
 
     /// Irradiance from the probes at every point, W·m⁻².
     pub fn irradiance(&self, query: &Query, mode: VisibilityMode) -> Vec<Vec3> {
-        let points = self.points.par_iter().zip(&self.masks);
-        points.map(|(point, &mask)| query.irradiance(point, mode.visibility(mask))).collect()
+        let asked = self.points.par_iter().zip(&self.masks);
+        asked.map(|(point, &mask)| query.irradiance(point, mode.visibility(mask))).collect()
     }
 
     /// The truth at the points, by `spp` paths from each, rounded up to whole blocks of sixteen, at most 64.
@@ -91,10 +97,15 @@ impl Air {
     }
 }
 
+/// Points of free air. They depend on the scene, on the [`bounds`] and on the seed alone.
+pub fn points(world: &World, volume: &Volume, seed: u64) -> Vec<QueryPoint> {
+    (0..POINTS).into_par_iter().filter_map(|index| point(world, volume, seed, index)).collect()
+}
+
 /// The box of the points, relative to the scene's origin: that of the scene as far as the probes' hull covers it. What the
 /// hull has beyond is no air that anything moves through, and volumes that cover the scene share their points. Along axes
 /// in which the scene is flat the hull counts.
-fn bounds(world: &World, volume: &Volume) -> (Vec3, Vec3) {
+pub fn bounds(world: &World, volume: &Volume) -> (Vec3, Vec3) {
     /// Spacings.
     const FLAT: f32 = 1e-3;
     let hull = volume.grid.hull(0.0);

@@ -14,10 +14,10 @@ use crate::evaluate::{BakedTruth, Comparison, Scenery, Seen, Shaded};
 use crate::image::Picture;
 use crate::probe::Volume;
 use crate::probe::file::{self, ProbeFile, SceneRecord};
-use crate::probe::query::Query;
+use crate::probe::query::{Query, QueryPoint};
 use crate::report::error::{ByRegion, ErrorEstimate};
 use crate::report::sweep::{BakeTimes, MethodFigures, RunRecord, TruthRecord};
-use crate::shade::air::{Air, AirTruth};
+use crate::shade::air::{self, Air, AirTruth};
 use crate::shade::reference::ReferenceSettings;
 use crate::shade::visibility_modes::VisibilityMode;
 use crate::system::progress::Progress;
@@ -35,9 +35,12 @@ pub struct Setting<'a, 's> {
     pub identity: String,
 }
 
-/// Truths in the air that were traced already, by the hash of their points.
+/// Points of the air, and the light there.
+type KnownAir = (Arc<Vec<QueryPoint>>, Arc<AirTruth>);
+
+/// What was traced in the air already, by the bits of the corners of the points' box.
 #[derive(Debug, Default)]
-pub struct Truths(RefCell<HashMap<[u8; 32], Arc<AirTruth>>>);
+pub struct Truths(RefCell<HashMap<[[u32; 3]; 2], KnownAir>>);
 
 /// A finished run, new or from the store.
 #[derive(Debug, Clone)]
@@ -103,8 +106,7 @@ impl Setting<'_, '_> {
         let file_query = Query { volume: &bake.volume, settings: &config.query };
         let (masks, masks_s) = self.scenery.masks(&file_query);
         let query = Query { volume: &truth.truth.volume, settings: &config.query };
-        let air = self.scenery.air(&file_query);
-        let in_air = self.truth_in_air(&air);
+        let (air, in_air) = self.in_air(&file_query);
         let seen = Seen { masks: &masks, masks_s, air: &air };
         let [_, mut on, mut ray] = self.scenery.shade(&query, seen, bake.bytes_per_probe, || {});
         let figures = |shaded: &mut Shaded| {
@@ -141,8 +143,7 @@ impl Setting<'_, '_> {
     fn shade(&self, config: &Config, bake: &Bake) -> [Shaded; 3] {
         let query = Query { volume: &bake.volume, settings: &config.query };
         let (masks, masks_s) = self.scenery.masks(&query);
-        let air = self.scenery.air(&query);
-        let in_air = self.truth_in_air(&air);
+        let (air, in_air) = self.in_air(&query);
         let seen = Seen { masks: &masks, masks_s, air: &air };
         let mut shaded = self.scenery.shade(&query, seen, bake.bytes_per_probe, || {});
         for s in &mut shaded {
@@ -152,16 +153,20 @@ impl Setting<'_, '_> {
         shaded
     }
 
-    /// The truth at points of the air. Configurations on the same grid share their points.
-    fn truth_in_air(&self, air: &Air) -> Arc<AirTruth> {
-        let mut hasher = blake3::Hasher::new();
-        for value in air.points.iter().flat_map(|point| [point.position, point.normal]).flat_map(|v| v.to_array()) {
-            hasher.update(&value.to_le_bytes());
-        }
-        let ReferenceSettings { spp, seed, .. } = self.reference_settings;
-        let key = *hasher.finalize().as_bytes();
+    /// Points of the air, and the truth there. Configurations that cover the same share both.
+    fn in_air(&self, query: &Query) -> (Air, Arc<AirTruth>) {
+        let world = self.scenery.world;
+        let (low, high) = air::bounds(world, query.volume);
+        let key = [low, high].map(|corner| corner.to_array().map(f32::to_bits));
         let mut known = self.truths.0.borrow_mut();
-        Arc::clone(known.entry(key).or_insert_with(|| Arc::new(air.truth(self.scenery.world, spp, seed))))
+        if let Some((points, truth)) = known.get(&key) {
+            return (Air::of(world, query, Arc::clone(points)), Arc::clone(truth));
+        }
+        let air = self.scenery.air(query);
+        let ReferenceSettings { spp, seed, .. } = self.reference_settings;
+        let truth = Arc::new(air.truth(world, spp, seed));
+        known.insert(key, (Arc::clone(&air.points), Arc::clone(&truth)));
+        (air, truth)
     }
 
     fn record(&self, seed: u64, bake: &Bake, shaded: &[Shaded; 3]) -> RunRecord {
@@ -176,6 +181,7 @@ impl Setting<'_, '_> {
         let probes = volume.states.len();
         RunRecord {
             seed,
+            offset: None,
             probes,
             probes_active: volume.active_count(),
             probes_blake3: positions_hash(volume),

@@ -1,7 +1,9 @@
-//! Points of free air within a volume and the scene's box, with normals in all directions: where an object asks that moves through the scene.
+//! Points of free air within a volume and the scene's box, with normals in all directions: where an object asks that moves
+//! through the scene.
 //!
 //! A point counts as inside geometry by the rule of the placement: where more than half of what rays around it meet are
-//! backs of single-sided surfaces. Inside solids of double-sided surfaces nothing tells that, and points there count.
+//! backs of single-sided surfaces. Inside solids of double-sided surfaces nothing tells that, and points there count; so do
+//! some in seams, where one solid runs into another and shows its fronts inside of it.
 
 use std::sync::Arc;
 

@@ -22,6 +22,14 @@ pub const PRESETS: &[Preset] = &[
     },
 ];
 
+/// The preset that is no method but what methods are compared with: the truth at the probes.
+const TRUTH: &str = "path";
+
+/// What `all` stands for.
+pub fn methods() -> impl Iterator<Item = &'static Preset> {
+    PRESETS.iter().filter(|preset| preset.name != TRUTH)
+}
+
 /// The preset of a name.
 ///
 /// # Errors

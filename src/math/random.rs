@@ -24,6 +24,12 @@ pub enum Purpose {
     Places = 7,
     /// Noise added to a reference, to measure how the reference's own noise changes FLIP.
     FlipReplicate = 16,
+    /// Points of free air, and their normals.
+    Air = 17,
+    /// Paths from points of free air.
+    AirPaths = 18,
+    /// Shifts of grids against the scene.
+    Offsets = 19,
 }
 
 /// A source of numbers for random decisions: a [`Random`] stream, or a point of an evenly distributed set

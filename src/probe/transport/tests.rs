@@ -48,6 +48,8 @@ impl World {
             positions: vec![Vec3::ZERO],
             irradiance: store.zeros(1, 1),
             occlusion: Occlusion::None,
+            radiance: Default::default(),
+            layout: Default::default(),
         };
         World { captures: vec![capture], volume }
     }

@@ -67,7 +67,7 @@ impl Plan {
         let per_bounce = bounces_s / f64::from(done.max(1));
         let reason = match limit {
             _ if transport.is_complete() => "every captured hit holds all light already".to_owned(),
-            _ if converged => format!("{done} iterations; what further bounces would add is below the tolerance"),
+            _ if converged => transport.settled_words(done),
             Some(most) => format!("all {most} bounces that were asked for; the tolerance was not reached"),
             None => format!("all {done} iterations; the tolerance was not reached"),
         };

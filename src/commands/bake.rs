@@ -280,6 +280,9 @@ fn summary(report: &BakeReport, config: &Config, output: &Path) -> String {
 /// How many there are, and by how many iterations where these are combined.
 fn bounces(report: &BakeReport, config: &Config) -> String {
     let iterations = report.bounces.len();
+    if let Some(stopped) = report.solver.stopped {
+        return format!("all, by {iterations} iterations: {}", stopped.in_words());
+    }
     match report.solver.accelerated {
         _ if config.transport.is_complete() => "all, by paths".to_owned(),
         0 => report.bounces.last().map_or(0, |bounce| bounce.index).to_string(),

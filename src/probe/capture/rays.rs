@@ -48,9 +48,10 @@ pub struct CubeRays {
 }
 
 impl Default for CubeRays {
-    /// The resolutions of Luo 2022. It publishes no exponent: this lobe is half a texel of the map wide, 1/√k = 0.0156.
+    /// The resolutions of Luo 2022. It publishes no exponent: this lobe, 1/√k = 0.022 wide, is the narrowest under which the
+    /// map, whose texels are up to 0.036 wide, still catches all of a small lamp's light: 4 % came and went at 4096.
     fn default() -> Self {
-        CubeRays { face: 256, resolution: 128, sharpness: 4096.0 }
+        CubeRays { face: 256, resolution: 128, sharpness: 2048.0 }
     }
 }
 

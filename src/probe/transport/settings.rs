@@ -219,6 +219,16 @@ impl Transport {
         }
     }
 
+    /// What so many iterations came to that have converged, in words.
+    pub fn settled_words(&self, done: u32) -> String {
+        match self {
+            Transport::Bounces(_) | Transport::Paths { .. } | Transport::Tracing(_) => {
+                format!("{done} iterations; what further bounces would add is below the tolerance")
+            }
+            Transport::Frames(_) => format!("{done} frames; their variability no longer falls"),
+        }
+    }
+
     /// The key of the number of iterations, for who needs more.
     pub fn limit_key(&self) -> &'static str {
         match self {

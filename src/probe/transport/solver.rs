@@ -88,6 +88,15 @@ pub enum Stopped {
     Limit,
 }
 
+impl Stopped {
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Stopped::Settled => "settled",
+            Stopped::Limit => "as many as there may be",
+        }
+    }
+}
+
 /// What the solver decides by.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Control {

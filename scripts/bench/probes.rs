@@ -99,6 +99,8 @@ fn filter_and_bounce(criterion: &mut Criterion) {
         settings: &config.capture,
         distance_clamp_m: None,
         hit_light: config.transport.hit_light(),
+        sees: false,
+        resampling: None,
         seed: 1,
     };
     let captures: Vec<ProbeCapture> =

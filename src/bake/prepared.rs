@@ -9,11 +9,13 @@ use crate::config::{Config, VISIBILITY};
 use crate::light::World;
 use crate::light::contact::Contacts;
 use crate::plan::Plan;
-use crate::probe::capture::{Capture, ProbeCapture};
+use crate::probe::capture::{Capture, CaptureSettings, ProbeCapture, Resampling};
 use crate::probe::lattice::ProbeState;
 use crate::probe::place::{Placement, PlacementSettings, PlacementTask, place};
+use crate::probe::store::kernel::Kernel;
 use crate::probe::store::occlusion::OcclusionBuilder;
-use crate::probe::store::{Occlusion, OcclusionStore, head_bytes};
+use crate::probe::store::radiance::{LightFieldStore, RadianceStore};
+use crate::probe::store::{Occlusion, OcclusionStore};
 use crate::probe::{Grid, Volume};
 
 /// Hits this far outside the hull of the probes, in spacings, still count as inside: rounding of the bounds.
@@ -30,6 +32,9 @@ pub struct Prepared<'w, 's> {
     pub plan: Plan,
     pub survey_s: f64,
     pub(super) memory: Memory,
+    /// The configuration's, less the rays that placement keeps for itself.
+    pub(super) capture: CaptureSettings,
+    resampling: Option<Resampling>,
     /// Hull of the probes relative to the scene's origin, a little enlarged.
     hull: (Vec3, Vec3),
 }
@@ -61,7 +66,11 @@ pub fn prepare<'w, 's>(
     let plan = Plan::new(world, config, &grid, &placement);
     let hull = grid.hull(HULL_TOLERANCE);
     let contacts = Contacts::of_points(world.scene, &placement.positions);
-    Ok(Prepared { world, config, grid, placement, contacts, plan, survey_s: log.times.survey, memory, hull })
+    let rays = config.capture.rays.without(config.placement.rule.reserved_rays());
+    let capture = CaptureSettings { rays, ..config.capture.clone() };
+    let resampling = log.time(|times| &mut times.filter, || capture.rays.resampling());
+    let survey_s = log.times.survey;
+    Ok(Prepared { world, config, grid, placement, contacts, plan, survey_s, memory, capture, resampling, hull })
 }
 
 impl Prepared<'_, '_> {
@@ -69,9 +78,11 @@ impl Prepared<'_, '_> {
         let clamp = self.config.store.occlusion.distance_clamp().filter(|_| self.stores_occlusion());
         Capture {
             world: self.world,
-            settings: &self.config.capture,
+            settings: &self.capture,
             distance_clamp_m: clamp.map(|diagonals| diagonals * self.grid.spacing().length()),
             hit_light: self.config.transport.hit_light(),
+            sees: self.config.store.light_field != LightFieldStore::None,
+            resampling: self.resampling.as_ref(),
             seed: circumstances.seed,
         }
     }
@@ -85,7 +96,7 @@ impl Prepared<'_, '_> {
     pub(super) fn occlusion_builder(&self) -> OcclusionBuilder {
         let (store, probes) = (&self.config.store, self.grid.probe_count());
         let occlusion = if self.stores_occlusion() { &store.occlusion } else { &OcclusionStore::None };
-        let directions = self.config.capture.rays.directions();
+        let directions = self.capture.rays.directions();
         occlusion.builder(self.placement.survey.as_ref(), &directions, probes, store.border)
     }
 
@@ -96,9 +107,31 @@ impl Prepared<'_, '_> {
 
     /// Traces one active probe.
     pub(super) fn trace(&self, capture: &Capture, probe: usize) -> ProbeCapture {
-        let position = self.contacts.viewpoint(probe, self.placement.positions[probe]);
+        capture.probe(probe, self.viewpoint(probe), |p| self.contains(p))
+    }
+
+    /// Traces one frame of an active probe.
+    pub(super) fn frame(&self, capture: &Capture, probe: usize, frame: u32) -> ProbeCapture {
+        capture.frame(probe, self.viewpoint(probe), |p| self.contains(p), frame)
+    }
+
+    /// Where a probe's rays start.
+    fn viewpoint(&self, probe: usize) -> Vec3 {
+        self.contacts.viewpoint(probe, self.placement.positions[probe])
+    }
+
+    fn contains(&self, p: Vec3) -> bool {
         let (low, high) = self.hull;
-        capture.probe(probe, position, |p| p.cmpge(low).all() && p.cmple(high).all())
+        p.cmpge(low).all() && p.cmple(high).all()
+    }
+
+    /// The filter from captures to the volume's irradiance.
+    pub(super) fn kernel(&self, volume: &Volume) -> Kernel {
+        // Frames make filters of their own.
+        match self.config.transport.captures_once() {
+            true => volume.irradiance.kernel(&self.capture.rays.directions()),
+            false => Kernel::of_rows(std::iter::empty()),
+        }
     }
 
     /// The volume before any light is in it.
@@ -109,16 +142,29 @@ impl Prepared<'_, '_> {
             states: self.placement.states.clone(),
             irradiance: store.irradiance.zeros(self.grid.probe_count(), store.border),
             occlusion,
+            radiance: self.radiance_store().zeros(self.grid.probe_count(), self.capture.rays.side().unwrap_or(0)),
+            layout: store.layout.clone(),
             grid: self.grid.clone(),
         }
+    }
+
+    /// What is stored of radiance: the levels for glossy surfaces only where the plan keeps them.
+    fn radiance_store(&self) -> RadianceStore<'_> {
+        let store = self.config.store.radiance();
+        RadianceStore { prefiltered: if self.plan.radiance_levels { store.prefiltered } else { &[] }, ..store }
     }
 
     /// Bytes per probe in the layout that shading uses: in full, and after the plan.
     pub(super) fn runtime_bytes(&self) -> (f64, f64) {
         let (store, probes) = (&self.config.store, self.grid.probe_count());
-        let head = head_bytes(self.config.placement.rule.moves()) + store.irradiance.runtime_bytes(store.border);
+        let side = self.capture.rays.side().unwrap_or(0);
+        let (field, levels) = store.radiance().runtime_bytes(side, store.layout.g_buffer);
+        let head = store.layout.head_bytes(self.config.placement.rule.moves());
+        let always = (head + store.irradiance.runtime_bytes(store.border) + field) as f64;
         let survey = self.placement.survey.as_ref();
-        let full = head as f64 + store.occlusion.runtime_bytes(store.border, survey, probes);
-        (full, if self.plan.visibility { full } else { head as f64 })
+        let occlusion = store.occlusion.runtime_bytes(store.border, survey, probes, &store.layout);
+        let kept_levels = if self.plan.radiance_levels { levels } else { 0 } as f64;
+        let kept = always + kept_levels + if self.plan.visibility { occlusion } else { 0.0 };
+        (always + levels as f64 + occlusion, kept)
     }
 }

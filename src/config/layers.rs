@@ -88,9 +88,11 @@ impl Layers {
             let what = format!("grid.{key} is given too; remove one, or put --set grid.{key}=None before");
             return invalid(last.map_or(place, |a| &a.place), what);
         }
-        let decides = |a: &&Assignment| ["store", "query"].iter().any(|section| a.path.starts_with(section));
-        match config.query.mismatch(&config.store.occlusion) {
-            Some(what) => invalid(self.assignments.iter().rfind(decides).map_or(place, |a| &a.place), what),
+        match config.mismatch() {
+            Some((sections, what)) => {
+                let decides = |a: &&Assignment| sections.iter().any(|section| a.path.starts_with(section));
+                invalid(self.assignments.iter().rfind(decides).map_or(place, |a| &a.place), what)
+            }
             None => Ok(config),
         }
     }

@@ -20,6 +20,21 @@ pub const PRESETS: &[Preset] = &[
         summary: "as default, but lit by full paths at every hit: the truth at the probes",
         text: include_str!("../../configs/presets/path.ron"),
     },
+    Preset {
+        name: "ddgi-2019",
+        summary: "dynamic diffuse global illumination, run until it has settled (Majercik et al. 2019, 2021)",
+        text: include_str!("../../configs/presets/ddgi-2019.ron"),
+    },
+    Preset {
+        name: "irradiance-2022",
+        summary: "irradiance probes from cube maps, one bounce, no visibility (Luo 2022)",
+        text: include_str!("../../configs/presets/irradiance-2022.ron"),
+    },
+    Preset {
+        name: "lightfield-2022",
+        summary: "light-field probes from cube maps, traced bounces, moments of distance (Luo 2022)",
+        text: include_str!("../../configs/presets/lightfield-2022.ron"),
+    },
 ];
 
 /// The preset that is no method but what methods are compared with: the truth at the probes.

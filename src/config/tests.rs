@@ -286,3 +286,43 @@ fn messages_name_the_place_that_decides() {
     let twice = Config::parse("(grid: (spacing_m: 2.0,\n spacing_m: 1.0))", "a.ron").unwrap_err().to_string();
     assert!(twice.contains("a.ron, line 2") && twice.contains("twice"), "{twice}");
 }
+
+/// The bytes of each published layout, from the code that counts them.
+#[test]
+fn published_layouts_have_their_published_sizes() {
+    let bytes = |name: &str| {
+        let config = preset(name);
+        let (store, side) = (&config.store, config.capture.rays.side().unwrap_or(0));
+        let (field, levels) = store.radiance().runtime_bytes(side, store.layout.g_buffer);
+        let head = store.layout.head_bytes(config.placement.rule.moves());
+        let occlusion = store.occlusion.runtime_bytes(store.border, None, 1, &store.layout);
+        [head, store.irradiance.runtime_bytes(store.border), occlusion as usize, field, levels]
+    };
+    assert_eq!(bytes("ddgi-2019"), [8, 256, 1024, 0, 0]);
+    assert_eq!(bytes("irradiance-2022"), [0, 65_536, 0, 0, 87_296]);
+    assert_eq!(bytes("irradiance-2022").iter().sum::<usize>(), 152_832);
+    // 192 KiB of what it names, and 576 KiB that its table says.
+    assert_eq!(bytes("lightfield-2022"), [0, 65_536, 65_536, 65_536, 0]);
+    assert_eq!(preset("lightfield-2022").store.layout.published, Some(576 << 10));
+}
+
+#[test]
+fn stages_that_do_not_go_together_are_refused() {
+    let refused = |preset: &str, set: &[&str]| {
+        let set: Vec<String> = set.iter().map(|s| (*s).to_owned()).collect();
+        Layers::default().preset(preset).unwrap().set(&set).unwrap().config().unwrap_err().to_string()
+    };
+    for (preset, set, words) in [
+        ("ddgi-2019", &["capture.emission=sampled"][..], "must be gathered"),
+        ("ddgi-2019", &["capture.rays.fibonacci.count=32"], "keeps 32 of them"),
+        ("ddgi-2019", &["transport=bounces()"], "leave_out"),
+        ("ddgi-2019", &["store.light_field=maps"], "octahedral or cube"),
+        ("lightfield-2022", &["store.light_field=none"], "store.light_field must be maps"),
+        ("irradiance-2022", &["store.prefiltered=[128, 32]"], "store.prefiltered"),
+        ("default", &["capture.rays=cube(sharpness: 0)"], "capture.rays.cube.sharpness"),
+        ("default", &["transport=frames(hysteresis: 1)"], "transport.frames.hysteresis"),
+    ] {
+        let error = refused(preset, set);
+        assert!(error.contains(words), "{set:?}: {error}");
+    }
+}

@@ -18,6 +18,7 @@ mod leaks;
 mod plan;
 mod probe_file;
 mod program;
+mod published;
 mod reading;
 mod reference;
 mod reports;

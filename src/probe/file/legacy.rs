@@ -5,7 +5,7 @@ use ron::extensions::Extensions;
 use serde::Deserialize;
 
 use super::record::{LightRecord, QUERY_VERSION, QueryRecord};
-use crate::probe::query::{Blend, DirectionWeight, QuerySettings, VisibilityTest};
+use crate::probe::query::{BiasSpacing, Blend, DirectionWeight, QuerySettings, VisibilityTest};
 use crate::probe::store::surface::TableTest;
 use crate::scene::Unassigned;
 
@@ -147,6 +147,9 @@ pub fn query(config: &str) -> Result<QueryRecord, String> {
             normal_bias: bias(q.normal_bias),
             view_bias: bias(q.view_bias),
             biased_cell: false,
+            bias_spacing: BiasSpacing::Largest,
+            distance_bias: 0.0,
+            blank_below: 0.0,
         },
         moved: old.placement.relocate,
         light: LightRecord {

@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 use super::point::QueryPoint;
 use crate::probe::lattice::grid::{Cell, Grid, ProbeIndex};
 use crate::probe::store::map::OctahedralMaps;
-use crate::probe::store::moments::chebyshev;
+use crate::probe::store::moments::chebyshev_shortened;
 use crate::probe::store::surface::{Seen, SurfaceVisibility, TableTest};
 
 pub trait CornerTest {
@@ -38,6 +38,8 @@ pub struct MomentsTest<'v> {
     pub positions: &'v [Vec3],
     pub power: f32,
     pub floor: f32,
+    /// By how much distances count as shorter, metres.
+    pub shorter: f32,
 }
 
 impl CornerTest for MomentsTest<'_> {
@@ -49,7 +51,8 @@ impl CornerTest for MomentsTest<'_> {
     #[inline]
     fn factor(&self, probe: ProbeIndex, biased: Vec3) -> f32 {
         let probe = probe.0 as usize;
-        chebyshev(self.maps, probe, biased - self.positions[probe]).powf(self.power).max(self.floor)
+        let from_probe = biased - self.positions[probe];
+        chebyshev_shortened(self.maps, probe, from_probe, self.shorter).powf(self.power).max(self.floor)
     }
 }
 

@@ -27,14 +27,17 @@ impl<'v> Query<'v> {
     /// The test that the mode and the settings ask for. Where nothing is stored everything is visible.
     #[inline]
     fn test(&self, visibility: Visibility) -> Test<'v> {
-        let Volume { occlusion, positions, .. } = self.volume;
+        let Volume { occlusion, positions, grid, .. } = self.volume;
         let found = match visibility {
             Visibility::Off => None,
             Visibility::Exact(mask) => Some(Test::Mask(Mask(mask))),
             Visibility::Stored => match self.settings.test {
                 VisibilityTest::None => None,
                 VisibilityTest::Chebyshev { power, floor } => {
-                    occlusion.moments().map(|maps| Test::Moments(MomentsTest { maps, positions, power, floor }))
+                    let shorter = self.settings.distance_bias * self.settings.spacing(grid);
+                    occlusion
+                        .moments()
+                        .map(|maps| Test::Moments(MomentsTest { maps, positions, power, floor, shorter }))
                 }
                 VisibilityTest::Table(test) => {
                     occlusion.surface().map(|table| Test::Surface(SurfaceTest { table, test }))
@@ -52,7 +55,7 @@ impl<'v> Query<'v> {
             return point.position;
         }
         let bias = point.normal * self.settings.normal_bias + point.view * self.settings.view_bias;
-        point.position + bias * self.volume.grid.spacing_max()
+        point.position + bias * self.settings.spacing(&self.volume.grid)
     }
 
     #[inline]
@@ -109,6 +112,9 @@ impl<'v> Query<'v> {
             }
             out.weights[i] = weight * trilinear[i];
         }
+        if settings.blank_below > 0.0 && out.weights.iter().all(|w| *w < settings.blank_below) {
+            out.weights = [0.0; 8];
+        }
         out
     }
 
@@ -139,6 +145,12 @@ impl<'v> Query<'v> {
         }
         self.settings.blend.backward(sum).into()
     }
+}
+
+/// Trilinear weights of the eight corners; they sum to 1.
+#[inline]
+pub fn trilinear(fraction: Vec3) -> [f32; 8] {
+    floored_trilinear(fraction, 0.0)
 }
 
 /// Trilinear weights of the eight corners, no axis below `floor`; without a floor they sum to 1.

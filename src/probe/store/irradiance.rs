@@ -124,6 +124,12 @@ impl IrradianceStore {
         ((store.resolution + 2 * border) as u64).pow(2) * TEXEL_BYTES.max(encoded)
     }
 
+    /// Format of its colours, and of those of radiance beside it.
+    pub fn format(&self) -> ColorFormat {
+        let IrradianceStore::Octahedral(store) = self;
+        store.format
+    }
+
     pub fn fineness(&self) -> Fineness {
         let IrradianceStore::Octahedral(store) = self;
         Fineness { rounding: store.format.rounding(), resolution: store.resolution }
@@ -197,6 +203,12 @@ impl Irradiance {
     pub fn is_linear(&self) -> bool {
         let Irradiance::Maps { curve, .. } = self;
         *curve == IrradianceCurve::Linear
+    }
+
+    /// The domain in which values are stored, and mixed over time.
+    pub fn curve(&self) -> IrradianceCurve {
+        let Irradiance::Maps { curve, .. } = self;
+        *curve
     }
 
     /// Linear unknowns of one probe.

@@ -2,15 +2,17 @@
 
 pub mod anderson;
 pub mod checkpoint;
+mod frames;
 pub mod operator;
 mod settings;
 pub mod solver;
 #[cfg(test)]
 mod tests;
+mod tracing;
 pub mod truth;
 
 use self::operator::{Captures, Operator};
-pub use self::settings::{Acceleration, BounceSettings, Transport};
+pub use self::settings::{Acceleration, BounceSettings, FrameSettings, TracingFilter, TracingSettings, Transport};
 use self::solver::{Progress, Solution};
 use super::Volume;
 
@@ -23,6 +25,13 @@ pub fn run<C: Captures>(
     progress: Progress,
     on_iteration: impl FnMut(&Progress, &Volume),
 ) -> Solution {
-    let solution = solver::solve(operator, &transport.iteration(), volume, progress, on_iteration);
-    Solution { converged: solution.converged || transport.is_complete(), ..solution }
+    match transport {
+        Transport::Bounces(settings) => solver::solve(operator, settings, volume, progress, on_iteration),
+        Transport::Paths { .. } => {
+            let solution = solver::solve(operator, &transport.iteration(), volume, progress, on_iteration);
+            Solution { converged: true, ..solution }
+        }
+        Transport::Frames(settings) => frames::solve(operator, settings, volume, progress, on_iteration),
+        Transport::Tracing(settings) => tracing::solve(operator, settings, volume, progress, on_iteration),
+    }
 }

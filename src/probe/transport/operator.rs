@@ -9,12 +9,13 @@ use std::time::Instant;
 use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
 
+use crate::light::World;
 use crate::light::lambert::reflected_radiance;
 use crate::math::color::luminance;
 use crate::math::octahedral::direction_from_oct;
 use crate::probe::Volume;
-use crate::probe::capture::ProbeCapture;
 use crate::probe::capture::surfel::Surfel;
+use crate::probe::capture::{ProbeCapture, Seen};
 use crate::probe::lattice::ProbeState;
 use crate::probe::query::{Query, QueryPoint, QuerySettings, Visibility};
 use crate::probe::store::kernel::Kernel;
@@ -23,6 +24,40 @@ use crate::probe::store::kernel::Kernel;
 pub trait Captures: Sync {
     /// Calls `visit` on one probe's capture.
     fn with<R>(&self, probe: usize, visit: impl FnOnce(&ProbeCapture) -> R) -> R;
+
+    /// A probe's capture in one of many frames, each with rays of its own. `None` where captures do not change.
+    fn frame(&self, _probe: usize, _frame: u32) -> Option<Frame> {
+        None
+    }
+
+    /// The filters from the captures of one frame to what `volume` holds; `None` where captures do not change.
+    fn filters(&self, _frame: u32, _volume: &Volume) -> Option<Filters> {
+        None
+    }
+
+    /// The scene, for transports that send rays from the captured surfaces; `None` where there is none.
+    fn scenery(&self) -> Option<Scenery<'_>> {
+        None
+    }
+}
+
+/// A frame's capture, and whether light may be learnt from it.
+pub struct Frame {
+    pub capture: ProbeCapture,
+    pub counts: bool,
+}
+
+/// Filters from the texels of a frame's captures.
+pub struct Filters {
+    pub irradiance: Kernel,
+    /// `None` where no distances are stored.
+    pub distance: Option<Kernel>,
+}
+
+/// What rays are traced in.
+pub struct Scenery<'a> {
+    pub world: &'a World<'a>,
+    pub seed: u64,
 }
 
 impl Captures for Vec<ProbeCapture> {
@@ -117,31 +152,64 @@ impl<C: Captures> Operator<'_, C> {
     /// One application at one active probe, with the masks of its own surfels.
     fn apply_to(&self, volume: &Volume, p: usize, masks: Option<&[u8]>) -> (Vec<Vec3A>, u64) {
         let kernel = self.kernel;
-        let query = Query { volume, settings: self.query };
         self.captures.with(p, |capture| {
-            let mut radiance =
-                if self.gathers_emission { capture.emitted_radiance() } else { vec![Vec3A::ZERO; capture.texels] };
-            let mut non_finite = 0;
-            for (i, surfel) in capture.surfels.iter().enumerate() {
-                let mut outgoing = surfel.direct_radiance;
-                if let Some(masks) = masks {
-                    let visibility = match masks[i] {
-                        0 => Visibility::Stored,
-                        mask => Visibility::Exact(mask),
-                    };
-                    let weights = query.weights(&self.query_point(surfel, volume.positions[p]), visibility);
-                    outgoing += reflected_radiance(surfel.albedo(), query.blend(&weights, surfel.oct()));
-                }
-                if outgoing.is_finite() {
-                    radiance[surfel.texel as usize] += Vec3A::from(outgoing);
-                } else {
-                    non_finite += 1;
-                }
-            }
+            let mask = |i: usize| masks.map(|masks| masks[i]);
+            let (radiance, non_finite) = self.outgoing(volume, p, capture, mask, self.gathers_emission);
             let mut irradiance = vec![Vec3A::ZERO; kernel.rows()];
             kernel.irradiance(&radiance, &mut irradiance);
             (irradiance, non_finite)
         })
+    }
+
+    /// Radiance in every texel of a capture, and how many hits' was not finite and left out. `mask` tells of a surfel what
+    /// it sees, 0 where that must be looked up, and `None` where nothing is asked of the probes.
+    pub fn outgoing(
+        &self,
+        volume: &Volume,
+        p: usize,
+        capture: &ProbeCapture,
+        mask: impl Fn(usize) -> Option<u8>,
+        emits: bool,
+    ) -> (Vec<Vec3A>, u64) {
+        let query = Query { volume, settings: self.query };
+        let mut radiance = if emits { capture.emitted_radiance() } else { vec![Vec3A::ZERO; capture.texels] };
+        let mut non_finite = 0;
+        for (i, surfel) in capture.surfels.iter().enumerate() {
+            let mut outgoing = surfel.direct_radiance;
+            if let Some(mask) = mask(i) {
+                let visibility = match mask {
+                    0 => Visibility::Stored,
+                    mask => Visibility::Exact(mask),
+                };
+                let weights = query.weights(&self.query_point(surfel, volume.positions[p]), visibility);
+                outgoing += reflected_radiance(surfel.albedo(), query.blend(&weights, surfel.oct()));
+            }
+            if outgoing.is_finite() {
+                radiance[surfel.texel as usize] += Vec3A::from(outgoing);
+            } else {
+                non_finite += 1;
+            }
+        }
+        (radiance, non_finite)
+    }
+
+    /// Fills what the volume holds of radiance: all that surfaces send towards the probes, with what they emit where
+    /// `emits`. Without `masks` the light of the probes is not asked.
+    pub fn keep_radiance(&self, volume: &mut Volume, masks: Option<&Masks>, emits: bool) {
+        /// Probes at once: bounds the memory of what is on its way.
+        const AT_ONCE: usize = 64;
+        let active: Vec<usize> = volume.active().collect();
+        for chunk in active.chunks(AT_ONCE) {
+            let of_probe = |&p: &usize| {
+                let mask = |i: usize| masks.map(|masks| masks.0[p][i]);
+                self.captures
+                    .with(p, |capture| (self.outgoing(volume, p, capture, mask, emits).0, capture.seen.clone()))
+            };
+            let found: Vec<_> = chunk.par_iter().map(of_probe).collect();
+            for (&p, (radiance, seen)) in chunk.iter().zip(found) {
+                volume.radiance.set(p, &radiance, |o| seen.get(o).and_then(Seen::surface));
+            }
+        }
     }
 
     /// Seconds that one application at these probes takes.

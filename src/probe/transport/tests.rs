@@ -18,6 +18,8 @@ use crate::probe::store::irradiance::{IrradianceCurve, OctahedralStore};
 use crate::probe::store::kernel::Directions;
 use crate::probe::store::{IrradianceStore, Occlusion};
 
+mod frames;
+
 const DIRECT: f32 = 0.25;
 const EMITTED: f32 = 0.5;
 
@@ -48,6 +50,8 @@ impl World {
             positions: vec![Vec3::ZERO],
             irradiance: store.zeros(1, 1),
             occlusion: Occlusion::None,
+            radiance: Default::default(),
+            layout: Default::default(),
         };
         World { captures: vec![capture], volume }
     }

@@ -38,6 +38,7 @@ impl Truth {
         seed: u64,
         progress: Progress,
     ) -> Truth {
+        let resampling = settings.rays.resampling();
         let kernel = volume.irradiance.kernel(&settings.rays.directions());
         let axes = volume.irradiance.axes();
         let contacts = Contacts::of_points(world.scene, &volume.positions);
@@ -48,6 +49,8 @@ impl Truth {
                 settings,
                 distance_clamp_m: None,
                 hit_light: HitLight::Paths(paths),
+                sees: false,
+                resampling: resampling.as_ref(),
                 seed: seed.wrapping_add((run + 1).wrapping_mul(SEED_STEP)),
             };
             let probe = |p: usize| -> Vec<Vec3A> {

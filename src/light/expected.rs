@@ -83,3 +83,33 @@ impl World<'_> {
         (0..is_known.len()).filter(|&key| is_known[key]).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f32::consts::PI;
+    use std::path::Path;
+
+    use super::*;
+    use crate::scene::{self, LoadOptions};
+    use crate::trace::Ray;
+    use glam::Vec3;
+
+    #[test]
+    fn places_of_a_furnace_expect_its_closed_form() {
+        // All walls emit 1 and reflect a half: π arrives directly, and as much again by reflections.
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/furnace.glb");
+        let scene = scene::load(&path, &LoadOptions::default()).unwrap();
+        let world = World::new(&scene, 1.0, 0.999).unwrap();
+        let key = |direction| Some(world.places.key_of(&world.surface(Ray::new(Vec3::splat(0.1), direction, 0))?));
+        let keys: Vec<usize> = Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]).filter_map(key).collect();
+        let expected = world.expect(keys.clone());
+        let light: Vec<Light> = keys.iter().filter_map(|&key| expected.at(key)).collect();
+        assert_eq!(light.len(), 6);
+        let mean = |of: fn(&Light) -> f32| light.iter().map(of).sum::<f32>() / 6.0;
+        // 32 cosine-distributed rays find the direct light without noise; a ray or two may slip through an edge.
+        assert!((mean(|l| l.direct) / PI - 1.0).abs() < 0.1, "{light:?}");
+        assert!((mean(|l| l.indirect) / PI - 1.0).abs() < 0.1, "{light:?}");
+        // Nothing is known of places that nobody asked for and no ray met.
+        assert!((0..world.places.keys()).any(|key| expected.at(key).is_none()));
+    }
+}

@@ -68,16 +68,24 @@ pub struct Gathered {
 const ROULETTE_FROM: u32 = 2;
 const BLIND_ROULETTE_FROM: u32 = 3;
 
-/// Of the survival of a path by what it is expected to bring: for certain with this share of what its start receives,
+/// A path survives for certain if it is expected to bring this share of what its start receives.
+///
+/// Rays × variance of `reference` with these constants, against roulette by throughput alone (in brackets with
+/// [`most_survival`] 1 and 0.25 here; with its square root): office 0.62 (0.76, 0.66), rooms apart 0.72 (0.81, 0.89),
+/// veach_ajar 0.88 (0.81, 0.90), bathroom 0.89 (0.89, 0.91), two_rooms_open 0.90 (1.04, 0.93), courtyard 0.96 (1.05, 0.94).
 const CERTAIN: f32 = 0.15;
-/// with this share expected everywhere besides what places know, because they know it roughly,
+
+/// What is expected everywhere besides what places know, as a share of what the start receives: they know it roughly.
 const UNEXPECTED: f32 = 0.2;
-/// with this share of a place's direct light, which the place's rays towards emitters mostly find,
+
+/// Share of a place's direct light that counts as expected: rays towards emitters find most of it.
 const DIRECT_BY_PATH: f32 = 0.25;
-/// and at most its throughput to this power. Rays × variance of `reference`, against roulette by throughput alone, with
-/// these (with power 0, CERTAIN 0.25; with power 0.5): office 0.62 (0.76, 0.66), rooms apart 0.72 (0.81, 0.89), veach_ajar
-/// 0.88 (0.81, 0.90), bathroom 0.89 (0.89, 0.91), two_rooms_open 0.90 (1.04, 0.93), courtyard 0.96 (1.05, 0.94).
-const MOST_SURVIVAL_POWER: f32 = 0.35;
+
+/// Largest probability with which a path of this throughput survives: its power of 3/8.
+fn most_survival(throughput: f32) -> f32 {
+    let root = throughput.sqrt().sqrt();
+    root * root.sqrt()
+}
 
 /// Least probability with which a path survives, unless its throughput is smaller still.
 const LEAST_SURVIVAL: f32 = 0.3;
@@ -344,7 +352,7 @@ impl Vertex<'_> {
             (Some(here), Some(start)) if start.sum() > 0.0 => {
                 let brings =
                     luminance(throughput) * ((here.indirect + DIRECT_BY_PATH * here.direct) / start.sum() + UNEXPECTED);
-                (brings / CERTAIN).min(most.powf(MOST_SURVIVAL_POWER)).max(most.min(LEAST_SURVIVAL)).min(1.0)
+                (brings / CERTAIN).min(most_survival(most)).max(most.min(LEAST_SURVIVAL)).min(1.0)
             }
             _ if bounce >= BLIND_ROULETTE_FROM => most.min(1.0),
             _ => 1.0,

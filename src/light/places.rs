@@ -19,6 +19,8 @@ pub struct Places {
     low: Vec3,
     /// Sides of a cell, metres.
     pub cell: Vec3,
+    /// Cells per metre.
+    density: Vec3,
     cells: UVec3,
     /// Six per cell, one per main direction.
     learnt: Vec<OnceLock<Box<Learnt>>>,
@@ -34,14 +36,20 @@ impl Places {
         let side = (volume / CELLS).cbrt() as f32;
         let cells = (size / side).ceil().max(Vec3::ONE).as_uvec3().min(UVec3::splat(CELLS as u32));
         let count = cells.to_array().iter().map(|&n| n as usize).product::<usize>();
-        Places { low, cell: size / cells.as_vec3(), cells, learnt: (0..6 * count).map(|_| OnceLock::new()).collect() }
+        Places {
+            low,
+            cell: size / cells.as_vec3(),
+            density: cells.as_vec3() / size,
+            cells,
+            learnt: (0..6 * count).map(|_| OnceLock::new()).collect(),
+        }
     }
 
     /// The cell that holds a position, and the main direction of a normal.
     #[inline]
     pub fn key(&self, position: Vec3, normal: Vec3) -> usize {
         // `as` truncates, saturates and sends NaN to 0.
-        let cell = ((position - self.low) / self.cell).max(Vec3::ZERO).as_uvec3().min(self.cells - UVec3::ONE);
+        let cell = ((position - self.low) * self.density).max(Vec3::ZERO).as_uvec3().min(self.cells - UVec3::ONE);
         let axis = normal.abs().max_position();
         let facing = 2 * axis + usize::from(normal[axis] < 0.0);
         let index = cell.x + self.cells.x * (cell.y + self.cells.y * cell.z);

@@ -46,7 +46,8 @@ fn furnace(albedo: [f64; 3], spp: u32, bounces: Option<u32>, strategy: Strategy)
 fn furnaces_of_all_albedos() {
     for strategy in STRATEGIES {
         furnace([0.0, 0.3, 0.5], 512, None, strategy);
-        furnace([0.8, 0.95, 0.9], 512, None, strategy);
+        // Long paths have rare bright samples: with few their mean is not yet normally distributed.
+        furnace([0.8, 0.95, 0.9], 2048, None, strategy);
         furnace([0.5; 3], 512, None, strategy);
     }
 }
@@ -62,7 +63,7 @@ fn bounces_are_the_terms_of_the_geometric_series() {
 
 #[test]
 fn rays_alone_have_no_noise_in_a_furnace() {
-    // Every ray meets the same radiance: up to Russian roulette, which begins at the third bounce, nothing is random.
+    // Every ray meets the same radiance: up to Russian roulette, which begins at the second bounce, nothing is random.
     let folder = Folder::new();
     let mut gltf = Gltf::new();
     add(&mut gltf, &room(3), diffuse([0.5; 3], [1.0; 3]));
@@ -70,8 +71,8 @@ fn rays_alone_have_no_noise_in_a_furnace() {
     let world = world(&scene);
     let camera = camera(&scene, [0.0; 3], [0.1, 0.2, -1.0], 60.0);
     let reference =
-        small(&world, &camera, &ReferenceSettings { max_bounces: Some(2), ..settings(32, Strategy::BsdfOnly) });
-    let expected = (PI * 1.75) as f32;
+        small(&world, &camera, &ReferenceSettings { max_bounces: Some(1), ..settings(32, Strategy::BsdfOnly) });
+    let expected = (PI * 1.5) as f32;
     for e in reference.irradiance_indirect() {
         assert!((*e - Vec3::splat(expected)).abs().max_element() < 1e-4, "{e}");
     }

@@ -68,8 +68,8 @@ fn cubes_and_octahedral_maps_see_the_same() {
         for (a, b) in filtered(a).into_iter().zip(filtered(b)) {
             // The blur moves light by 0.09 rad in all directions alike: 0.09² of it is lost to a cosine. Sums over the
             // map's texels, up to 0.14 rad wide, catch a lobe of that width to 0.1 %; the lamp's edges in texels of the
-            // map add 1 %.
-            assert!((a - b).abs().max_element() < 0.025 * largest, "{what}: {a} {b}");
+            // map, whose places are off by a fifth of 0.1 rad, add 2 %.
+            assert!((a - b).abs().max_element() < 0.04 * largest, "{what}: {a} {b}");
         }
     }
     // Mean distances under the lobe of the moments.

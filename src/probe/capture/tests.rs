@@ -66,17 +66,17 @@ fn cubes_and_octahedral_maps_see_the_same() {
     for (what, a, b) in [("emission", &a.0, &b.0), ("albedo", &a.2, &b.2)] {
         let largest = filtered(a).into_iter().fold(Vec3A::ZERO, Vec3A::max).max_element();
         for (a, b) in filtered(a).into_iter().zip(filtered(b)) {
-            // The blur moves light by 0.09 rad in all directions alike: 0.09² of it is lost to a cosine. Sums over the
-            // map's texels, up to 0.14 rad wide, catch a lobe of that width to 0.1 %; the lamp's edges in texels of the
-            // map, whose places are off by a fifth of 0.1 rad, add 2 %.
-            assert!((a - b).abs().max_element() < 0.04 * largest, "{what}: {a} {b}");
+            // The lamp is in the middle of a face. Of its light 6/k are lost there, see [`super::cube`], and 1/k to a cosine
+            // by the blur: 5.5 % at k = 128. Its edges in texels of the map, whose places are off by a fifth of 0.1 rad, add
+            // 2 %.
+            assert!((a - b).abs().max_element() < 0.075 * largest, "{what}: {a} {b}");
         }
     }
     // Mean distances under the lobe of the moments.
     let lobe = Kernel::lobe(&directions, &axes, 50.0);
     for (a, b) in lobe.distance(&map.distances).iter().zip(lobe.distance(&cube.distances)) {
-        // The blur widens the lobe, of 1/√50 = 0.14 rad, by a fifth.
-        assert!((a.mean() / b.mean() - 1.0).abs() < 0.03, "{} {}", a.mean(), b.mean());
+        // The blur widens the lobe, of 1/√50 = 0.14 rad, by a fifth; along a slope of 1 means move by as much as 0.03.
+        assert!((a.mean() / b.mean() - 1.0).abs() < 0.05, "{} {}", a.mean(), b.mean());
     }
     // Where a texel and its neighbours lie on one flat wall, the surface itself is the same.
     let mut flat = 0;
@@ -89,7 +89,7 @@ fn cubes_and_octahedral_maps_see_the_same() {
             assert!((da / db - 1.0).abs() < 0.05, "texel {o}: {da} {db}");
         }
     }
-    assert!(flat > n * n / 2, "{flat} flat texels");
+    assert!(flat > n * n / 4, "{flat} flat texels");
 }
 
 /// Surfels of a resampled cube stand on surfaces.

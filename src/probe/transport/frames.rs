@@ -11,6 +11,9 @@
 //!
 //! Left out: thresholds of change in brightness and irradiance, the least step of darkening, and saturation of samples.
 
+#[cfg(test)]
+mod tests;
+
 use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
 
@@ -165,27 +168,4 @@ fn blend(volume: &mut Volume, found: &[Option<Found>], kept: f32) -> Sums {
         texels: a.texels + b.texels,
         varying: a.varying + b.varying,
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn frames_end_where_variability_no_longer_falls() {
-        let settings = FrameSettings { window: 3, least: 4, fall: 0.01, ..Default::default() };
-        let settled = |variability: &[f64]| {
-            let frame = |&residual| Bounce { index: 0, residual, energy: 0.0, accelerated: false };
-            has_settled(&variability.iter().map(frame).collect::<Vec<_>>(), &settings)
-        };
-        // The first frame is not looked at, and two windows must be full.
-        assert!(!settled(&[0.0, 1.0, 1.0, 1.0, 1.0, 1.0]));
-        assert!(settled(&[0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]));
-        // From 0.95 to 0.94, by 1.05 %; to 0.945, by 0.5 %.
-        assert!(!settled(&[0.0, 1.0, 0.95, 1.0, 0.97, 0.94, 0.99]));
-        assert!(settled(&[0.0, 1.0, 0.95, 1.0, 0.97, 0.945, 0.99]));
-        // What lies before the windows does not count.
-        assert!(!settled(&[0.0, 0.1, 1.0, 1.0, 1.0, 0.9, 0.9, 0.9]));
-        assert!(settled(&[0.0; 7]), "nothing falls below zero");
-    }
 }

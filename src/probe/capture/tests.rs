@@ -75,8 +75,9 @@ fn cubes_and_octahedral_maps_see_the_same() {
     // Mean distances under the lobe of the moments.
     let lobe = Kernel::lobe(&directions, &axes, 50.0);
     for (a, b) in lobe.distance(&map.distances).iter().zip(lobe.distance(&cube.distances)) {
-        // The blur widens the lobe, of 1/√50 = 0.14 rad, by a fifth; along a slope of 1 means move by as much as 0.03.
-        assert!((a.mean() / b.mean() - 1.0).abs() < 0.05, "{} {}", a.mean(), b.mean());
+        // Blur by 1/√k makes a wall that is seen under the angle θ farther by 1/k·(1 + tan²θ) of its distance: 7 % at 70°,
+        // and the lobe looks no more steeply at most of what it holds.
+        assert!((a.mean() / b.mean() - 1.0).abs() < 0.1, "{} {}", a.mean(), b.mean());
     }
     // Where a texel and its neighbours lie on one flat wall, the surface itself is the same.
     let mut flat = 0;

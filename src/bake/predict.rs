@@ -19,6 +19,9 @@ use crate::trace::Ray;
 /// Probes traced to predict.
 const PILOT: usize = 32;
 
+/// Rays of all these together.
+const PILOT_RAYS: usize = 1 << 21;
+
 /// What a bake would take.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prediction {
@@ -59,7 +62,8 @@ impl Prepared<'_, '_> {
         let capture = self.capture(circumstances);
         // Large captures are alike, and few of them fit into memory.
         let fitting = (CHUNK_BYTES / surfels_bytes(config).max(1)) as usize;
-        let (pilot, share) = self.pilot(fitting.clamp(1, PILOT));
+        let quick = PILOT_RAYS / self.capture.rays.count().max(1);
+        let (pilot, share) = self.pilot(fitting.min(quick).clamp(1, PILOT));
         let occlusion = self.occlusion_builder();
         let started = Instant::now();
         let trace = |&probe: &usize| {

@@ -33,20 +33,24 @@ const INSIDE: &str = "--set grid.divisions=(2,2,2) --set grid.bounds={\"min\":[-
 #[test]
 fn furnaces() {
     let folder = Folder::new();
-    for (preset, expected, tolerance) in [
+    // Half a step of 5 bits of mantissa.
+    const STEP: f64 = 1.0 / 64.0;
+    for (preset, expected, lost, gained) in [
         // Stored as 1, whose fifth power is exact; the frames end within 10⁻⁴ of it.
-        ("ddgi-2019", 2.0 * PI, 1e-3),
-        // Half a step of 5 bits of mantissa, and 2 % of noise of one sample at each of 24,576 hits.
-        ("irradiance-2022", 1.5 * PI, 1.0 / 64.0 + 0.005),
-        // The same, and what lies below a thousandth in each iteration.
-        ("lightfield-2022", 2.0 * PI, 1.0 / 64.0 + 0.01),
+        ("ddgi-2019", 2.0 * PI, 1e-3, 1e-3),
+        // Noise of one sample at each of 24,576 hits.
+        ("irradiance-2022", 1.5 * PI, STEP + 0.005, STEP + 0.005),
+        // Rays that end in a corner, where a texel's distance is the mean of two walls', find all probes' distances too
+        // short, and bring nothing: 4 % at this resolution, 0.5 % at the published one. Beside it what lies below a
+        // thousandth in the last iteration.
+        ("lightfield-2022", 2.0 * PI, STEP + 0.05, STEP),
     ] {
         let baked = bake(&folder, &scene("furnace"), &format!("{} {INSIDE}", small(preset)));
         assert_eq!(baked.file.active().len(), 8, "{preset}");
         for probe in baked.file.active() {
             for channel in baked.file.mean_irradiance(probe) {
                 let off = channel / expected - 1.0;
-                assert!(off.abs() < tolerance, "{preset}, probe {probe}: {channel} instead of {expected}");
+                assert!((-lost..gained).contains(&off), "{preset}, probe {probe}: {channel} instead of {expected}");
             }
         }
         let stopped = &baked.report["solver"]["stopped"];

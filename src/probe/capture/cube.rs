@@ -3,6 +3,9 @@
 //! Texel `x + n·(y + n·f)` of a cube of n² texels a face is that of column x and row y of face f, 2·axis + (1 where
 //! negative). Its rays go through texel centres. A texel of the map with the direction d is the mean of all texels of
 //! the cube, with the directions d′, under max(0, d·d′)^sharpness.
+//!
+//! As published, weights count texels and not the solid angles that they stand for. Around the middle of a face texels grow
+//! denser by 1 + 3/2·θ², so that of a small lamp's light there 6/k is lost, k the sharpness: 0.3 % in the presets.
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;

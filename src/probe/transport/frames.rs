@@ -5,11 +5,14 @@
 //! the first frame and while the texel is black. Distances are mixed alike. The mean of a concave curve is below the curve of
 //! the mean: the result is darker than the truth where few rays bring most of the light.
 //!
-//! *Variability* is the mean of √lum((s − m₀)(s − m₁))/lum(m₁) over the texels that had a sample, m₀ and m₁ the means before
-//! and after; 0 where lum(m₁) is at most 1/1024. It falls while light spreads and stays where only noise is left: the
-//! frames end when it has not fallen by a share within a number of frames.
+//! *Variability* is the mean of √lum((s − m₀)(s − m₁))/lum(m₁) over the texels that had a sample and were not black, m₀ and
+//! m₁ the means before and after; 0 where lum(m₁) is at most 1/1024. It falls while light spreads and stays where only noise
+//! is left: the frames end when it has not fallen by a share within a number of frames.
 //!
 //! Left out: thresholds of change in brightness and irradiance, the least step of darkening, and saturation of samples.
+
+#[cfg(test)]
+mod tests;
 
 use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
@@ -45,22 +48,21 @@ struct Sums {
     variability: f64,
     energy: f64,
     texels: usize,
+    /// Texels that were not black before.
+    varying: usize,
 }
 
-/// When to end, from the variability of all frames so far.
-#[derive(Debug, Clone, Copy, Default)]
-struct Watch {
-    lowest: Option<f64>,
-    frames_since: u32,
-}
-
-impl Watch {
-    fn see(&mut self, variability: f64, fall: f32) {
-        match self.lowest {
-            Some(lowest) if variability > lowest * (1.0 - f64::from(fall)) || lowest == 0.0 => self.frames_since += 1,
-            _ => (self.lowest, self.frames_since) = (Some(variability), 0),
-        }
+/// Whether variability no longer falls: the least of the last `window` frames against the least of as many before. The first
+/// frame is a mean of itself, and varies by nothing.
+fn has_settled(frames: &[Bounce], settings: &FrameSettings) -> bool {
+    let window = settings.window as usize;
+    let least = |frames: &[Bounce]| frames.iter().map(|frame| frame.residual).fold(f64::INFINITY, f64::min);
+    if frames.len() < (settings.least as usize).max(2 * window + 1) {
+        return false;
     }
+    let (before, last) = frames[frames.len() - 2 * window..].split_at(window);
+    let (before, last) = (least(before), least(last));
+    before == 0.0 || last > before * (1.0 - f64::from(settings.fall))
 }
 
 /// Runs frames until the light has settled.
@@ -74,9 +76,6 @@ pub fn solve<C: Captures>(
     if let Some(distances) = progress.fields.remove(DISTANCES) {
         volume.occlusion.restore(&distances);
     }
-    let mut watch = Watch::default();
-    // The first frame is a mean of itself, and varies by nothing.
-    progress.solution.bounces.iter().skip(1).for_each(|frame| watch.see(frame.residual, settings.fall));
     for frame in progress.solution.bounces.len() as u32..settings.most {
         if progress.solution.converged {
             break;
@@ -95,14 +94,10 @@ pub fn solve<C: Captures>(
             solution.light_clamped += found.clamped;
         }
         let texels = sums.texels.max(1) as f64;
-        let variability = sums.variability / texels;
-        if frame > 0 {
-            watch.see(variability, settings.fall);
-        }
+        let variability = sums.variability / sums.varying.max(1) as f64;
         let energy = sums.energy / texels;
         solution.bounces.push(Bounce { index: frame, residual: variability, energy, accelerated: false });
-        let enough = frame + 1 >= settings.least;
-        solution.converged = enough && watch.frames_since >= settings.window;
+        solution.converged = has_settled(&solution.bounces, settings);
         progress.fields.insert(DISTANCES.to_owned(), volume.occlusion.stored());
         on_iteration(&progress, volume);
     }
@@ -148,10 +143,12 @@ fn blend(volume: &mut Volume, found: &[Option<Found>], kept: f32) -> Sums {
         let mut sums = Sums::default();
         let mut texel = |(before, sample): (Vec3A, &Vec3A)| {
             let (old, sample) = (curve.encode(before), curve.encode(*sample));
-            let kept = if old == Vec3A::ZERO { 0.0 } else { kept };
+            let starts = old == Vec3A::ZERO;
+            let kept = if starts { 0.0 } else { kept };
             let new = old * kept + sample * (1.0 - kept);
             let brightness = luminance(new.into());
-            if brightness > DARK {
+            sums.varying += usize::from(!starts);
+            if brightness > DARK && !starts {
                 let product: Vec3 = ((sample - old) * (sample - new)).into();
                 sums.variability += f64::from(luminance(product).max(0.0).sqrt() / brightness);
             }
@@ -169,28 +166,6 @@ fn blend(volume: &mut Volume, found: &[Option<Found>], kept: f32) -> Sums {
         variability: a.variability + b.variability,
         energy: a.energy + b.energy,
         texels: a.texels + b.texels,
+        varying: a.varying + b.varying,
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn frames_end_where_variability_no_longer_falls() {
-        let mut watch = Watch::default();
-        // Falls by a hundredth and more.
-        [1.0, 0.98, 0.96].iter().for_each(|&v| watch.see(v, 0.01));
-        assert_eq!(watch.frames_since, 0);
-        // By less than that, or not at all.
-        [0.955, 0.97, 0.952].iter().for_each(|&v| watch.see(v, 0.01));
-        assert_eq!((watch.lowest, watch.frames_since), (Some(0.96), 3));
-        // Together it is enough.
-        watch.see(0.95, 0.01);
-        assert_eq!((watch.lowest, watch.frames_since), (Some(0.95), 0));
-        // Nothing falls below zero.
-        let mut still = Watch::default();
-        (0..5).for_each(|_| still.see(0.0, 0.01));
-        assert_eq!(still.frames_since, 4);
-    }
 }

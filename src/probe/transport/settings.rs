@@ -23,7 +23,7 @@ pub enum Transport {
 pub struct FrameSettings {
     /// Share of what came before that stays, in the domain in which irradiance is stored.
     pub hysteresis: f32,
-    /// The end: variability has not fallen by the share `fall` within so many frames.
+    /// The end: the least variability of so many frames is not below that of as many before by the share `fall`.
     pub window: u32,
     pub fall: f32,
     /// Fewest frames, and most.

@@ -18,8 +18,6 @@ use crate::probe::store::irradiance::{IrradianceCurve, OctahedralStore};
 use crate::probe::store::kernel::Directions;
 use crate::probe::store::{IrradianceStore, Occlusion};
 
-mod frames;
-
 const DIRECT: f32 = 0.25;
 const EMITTED: f32 = 0.5;
 

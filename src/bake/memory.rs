@@ -7,7 +7,6 @@ use crate::probe::Grid;
 use crate::probe::capture::ProbeCapture;
 use crate::probe::capture::surfel::Surfel;
 use crate::probe::place::survey;
-use crate::probe::store::kernel::Kernel;
 use crate::probe::transport::anderson::History;
 use crate::scene::{Mesh, Scene};
 use crate::system::memory::{TooLittleMemory, available_bytes};
@@ -48,7 +47,7 @@ impl Memory {
         Memory {
             probes: probes * PROBE_BYTES,
             survey: survey.map_or(0, |voxels| survey::estimated_bytes(mesh, grid, voxels)),
-            kernels: Kernel::bytes(texels, unknowns, 1.0) + distance_kernel,
+            kernels: store.irradiance.filter_bytes(texels) + distance_kernel,
             maps: probes * per_probe + history,
             in_flight: (surfels_bytes(config) + distances) * rayon::current_num_threads() as u64,
         }

@@ -358,9 +358,4 @@ impl ProbeCapture {
         self.emitted.iter().for_each(|&(texel, emitted)| radiance[texel as usize] += Vec3A::from(emitted));
         radiance
     }
-
-    /// Irradiance around `normal` from the emitters sampled at the probe's centre, W·m⁻².
-    pub fn sampled_emitter_irradiance(&self, normal: Vec3) -> Vec3 {
-        self.emitter_samples.iter().map(|(direction, light)| *light * normal.dot(*direction).max(0.0)).sum()
-    }
 }

@@ -1,6 +1,6 @@
 //! The look-up itself.
 
-use glam::{Vec2, Vec3, Vec3A};
+use glam::{Vec2, Vec3};
 
 use super::corner_test::{CornerTest, Mask, MomentsTest, SurfaceTest};
 use super::point::{CornerWeights, QueryPoint, Visibility};
@@ -114,7 +114,9 @@ impl<'v> Query<'v> {
 
     /// Irradiance around the point's normal, W·m⁻²; zero where no probe counts.
     pub fn irradiance(&self, point: &QueryPoint, visibility: Visibility) -> Vec3 {
-        self.blend(&self.weights(point, visibility), oct_from_direction(point.normal))
+        let irradiance = self.blend(&self.weights(point, visibility), oct_from_direction(point.normal));
+        // Sums of harmonics dip below 0 beside bright lights. Bounces keep that, to stay linear; no one is shown it.
+        if self.volume.irradiance.signed().is_some() { irradiance.max(Vec3::ZERO) } else { irradiance }
     }
 
     /// Weighted mean of the probes' irradiance around the direction `oct`.
@@ -124,19 +126,12 @@ impl<'v> Query<'v> {
         if total <= 0.0 {
             return Vec3::ZERO;
         }
-        let irradiance = &self.volume.irradiance;
-        // One direction serves all eight probes.
-        let around = irradiance.around(oct);
         // Crushed weights may be so small that the reciprocal of their sum overflows; their shares are the same.
         let lift = if total < f32::MIN_POSITIVE { 1.0 / f32::MIN_POSITIVE } else { 1.0 };
         let per_total = 1.0 / (total * lift);
-        let mut sum = Vec3A::ZERO;
-        for (probe, weight) in corners.probes.iter().zip(corners.weights) {
-            if weight > 0.0 {
-                let irradiance = irradiance.at(probe.0 as usize, &around);
-                sum += self.settings.blend.forward(irradiance) * (weight * lift * per_total);
-            }
-        }
+        let counted = corners.probes.iter().zip(corners.weights).filter(|(_, weight)| *weight > 0.0);
+        let shares = counted.map(|(probe, weight)| (probe.0 as usize, weight * lift * per_total));
+        let sum = self.volume.irradiance.sum(oct, shares, |e| self.settings.blend.forward(e));
         self.settings.blend.backward(sum).into()
     }
 }

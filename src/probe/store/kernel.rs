@@ -4,6 +4,8 @@
 //! computed once and shared by all probes. Rows are normalised to 1: constant radiance L gives an irradiance of
 //! exactly πL, whatever the resolutions.
 
+mod harmonics;
+
 use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3, Vec3A};

@@ -9,6 +9,7 @@ pub mod kernel;
 pub mod map;
 pub mod moments;
 pub mod occlusion;
+pub mod sh;
 pub mod surface;
 #[cfg(test)]
 mod tests;

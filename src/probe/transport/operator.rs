@@ -4,6 +4,7 @@
 //! with the method's own weights, G is the irradiance filter, B⁰ the radiance that hits reflect of light that did not pass
 //! through probes.
 
+use std::f32::consts::PI;
 use std::time::Instant;
 
 use glam::{Vec3, Vec3A};
@@ -100,6 +101,9 @@ impl<C: Captures> Operator<'_, C> {
                 capture.surfels.iter().for_each(|s| {
                     albedo[s.texel as usize] += Vec3A::from(reflected_radiance(s.albedo(), ones));
                 });
+                if let Some((_, overshoot)) = volume.irradiance.signed() {
+                    return PI * overshoot * albedo.into_iter().fold(Vec3A::ZERO, Vec3A::max);
+                }
                 let mut reflected = vec![Vec3A::ZERO; self.kernel.rows()];
                 self.kernel.irradiance(&albedo, &mut reflected);
                 reflected.into_iter().fold(Vec3A::ZERO, Vec3A::max)
@@ -164,8 +168,10 @@ impl<C: Captures> Operator<'_, C> {
     /// Returns the mean luminance of the irradiance added, over all unknowns of active probes.
     pub fn add_emission(&self, volume: &mut Volume) -> f64 {
         let kernel = self.kernel;
-        let axes = volume.irradiance.axes();
+        let lobes = volume.irradiance.lobes();
         let states = &volume.states;
+        // Of unknowns with signs the first is the mean irradiance.
+        let group = volume.irradiance.signed().map_or(1, |(group, _)| group);
         let add = |p: usize, before: &mut dyn Iterator<Item = Vec3A>| {
             if states[p] != ProbeState::Active {
                 return None;
@@ -174,9 +180,12 @@ impl<C: Captures> Operator<'_, C> {
                 let mut emitted = vec![Vec3A::ZERO; kernel.rows()];
                 let mut energy = 0.0;
                 kernel.irradiance(&capture.emitted_radiance(), &mut emitted);
-                for ((value, (normal, _)), before) in emitted.iter_mut().zip(&axes).zip(before) {
-                    *value += Vec3A::from(capture.sampled_emitter_irradiance(*normal));
-                    energy += f64::from(luminance((*value).into()));
+                let sampled = lobes.of_samples(&capture.emitter_samples);
+                for (o, ((value, sampled), before)) in emitted.iter_mut().zip(sampled).zip(before).enumerate() {
+                    *value += sampled;
+                    if o % group == 0 {
+                        energy += f64::from(luminance((*value).into()));
+                    }
                     *value += before;
                 }
                 Some((emitted, energy))
@@ -184,7 +193,7 @@ impl<C: Captures> Operator<'_, C> {
         };
         // Summed in order, on one thread: the same for any number of threads.
         let energies: Vec<Option<f64>> = volume.irradiance.set_each(add);
-        let unknowns = energies.iter().flatten().count() * kernel.rows();
+        let unknowns = energies.iter().flatten().count() * kernel.rows() / group;
         energies.iter().flatten().sum::<f64>() / unknowns.max(1) as f64
     }
 }

@@ -39,7 +39,7 @@ impl Truth {
         progress: Progress,
     ) -> Truth {
         let kernel = volume.irradiance.kernel(&settings.rays.directions());
-        let axes = volume.irradiance.axes();
+        let lobes = volume.irradiance.lobes();
         let contacts = Contacts::of_points(world.scene, &volume.positions);
         let bar = progress.stage("path-traced probes", RUNS as usize * volume.active_count());
         let run = |run: u64| -> Vec<Vec<Vec3A>> {
@@ -60,9 +60,8 @@ impl Truth {
                 traced.surfels.iter().for_each(|s| radiance[s.texel as usize] += Vec3A::from(s.direct_radiance));
                 let mut irradiance = vec![Vec3A::ZERO; kernel.rows()];
                 kernel.irradiance(&radiance, &mut irradiance);
-                for (value, (normal, _)) in irradiance.iter_mut().zip(&axes) {
-                    *value += Vec3A::from(traced.sampled_emitter_irradiance(*normal));
-                }
+                let sampled = lobes.of_samples(&traced.emitter_samples);
+                irradiance.iter_mut().zip(sampled).for_each(|(value, sampled)| *value += sampled);
                 irradiance
             };
             (0..volume.states.len()).into_par_iter().map(probe).collect()

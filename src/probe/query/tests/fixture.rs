@@ -49,8 +49,9 @@ impl Fixture {
     /// Stored values by probe, column and row; columns and rows count from the border, 0 to 5.
     pub fn store(&mut self, curve: IrradianceCurve, texel: impl Fn(usize, usize, usize) -> [f32; 3]) {
         let mut stored = maps(self.volume.grid.probe_count(), curve);
-        let Irradiance::Maps { maps, .. } = &mut stored;
-        fill(maps, |p, c, r| Vec3A::from_array(texel(p, c, r)));
+        if let Irradiance::Maps { maps, .. } = &mut stored {
+            fill(maps, |p, c, r| Vec3A::from_array(texel(p, c, r)));
+        }
         self.volume.irradiance = stored;
     }
 

@@ -102,7 +102,7 @@ impl Memory {
 /// # Errors
 /// [`BakeError::Grid`], [`BakeError::Memory`].
 pub fn check(config: &Config, scene: &Scene) -> Result<(), BakeError> {
-    let grid = Grid::new(&config.grid, scene)?;
+    let grid = Grid::refined(&config.grid, config.placement.refine, scene)?;
     Ok(Memory::of(config, &grid, &scene.mesh).check(config, 0)?)
 }
 
@@ -112,7 +112,7 @@ pub fn check(config: &Config, scene: &Scene) -> Result<(), BakeError> {
 /// # Errors
 /// [`BakeError::Grid`].
 pub fn surely_fits(config: &Config, scene: &Scene) -> Result<bool, BakeError> {
-    let grid = Grid::new(&config.grid, scene)?;
+    let grid = Grid::refined(&config.grid, config.placement.refine, scene)?;
     let captures = (grid.probe_count() as u64).saturating_mul(surfels_bytes(config));
     Ok(Memory::of(config, &grid, &scene.mesh).check(config, captures).is_ok())
 }

@@ -14,7 +14,7 @@ use crate::probe::lattice::ProbeState;
 use crate::probe::place::{Placement, PlacementSettings, PlacementTask, place};
 use crate::probe::store::occlusion::OcclusionBuilder;
 use crate::probe::store::{Occlusion, OcclusionStore, head_bytes};
-use crate::probe::{Grid, Volume};
+use crate::probe::{Grid, ProbeIndex, Volume};
 
 /// Hits this far outside the hull of the probes, in spacings, still count as inside: rounding of the bounds.
 const HULL_TOLERANCE: f32 = 1e-3;
@@ -44,7 +44,7 @@ pub fn prepare<'w, 's>(
     circumstances: &Circumstances,
 ) -> Result<Prepared<'w, 's>, BakeError> {
     let mut log = Log::new(circumstances.progress);
-    let grid = Grid::new(&config.grid, world.scene)?;
+    let grid = Grid::refined(&config.grid, config.placement.refine, world.scene)?;
     let memory = Memory::of(config, &grid, &world.scene.mesh);
     memory.check(config, 0)?;
     let keep_unsampled = config.placement.keep_unsampled || config.plan.keeps("unused_probes");
@@ -97,8 +97,12 @@ impl Prepared<'_, '_> {
     /// Traces one active probe.
     pub(super) fn trace(&self, capture: &Capture, probe: usize) -> ProbeCapture {
         let position = self.contacts.viewpoint(probe, self.placement.positions[probe]);
+        let index = ProbeIndex(probe as u32);
+        // A probe that stands for a larger cell must know distances as much farther.
+        let farther = self.grid.width(index) as f32;
+        let capture = Capture { distance_clamp_m: capture.distance_clamp_m.map(|m| m * farther), ..*capture };
         let (low, high) = self.hull;
-        capture.probe(probe, position, |p| p.cmpge(low).all() && p.cmple(high).all())
+        capture.probe(self.grid.stream(index) as usize, position, |p| p.cmpge(low).all() && p.cmple(high).all())
     }
 
     /// The volume before any light is in it.

@@ -10,6 +10,7 @@ use super::{Console, tell};
 use crate::cli::InspectArgs;
 use crate::probe::file::{self, FORMAT, ProbeFile};
 use crate::probe::lattice::ProbeState;
+use crate::probe::lattice::tree::Tree;
 use crate::probe::{ProbeIndex, Volume};
 use crate::report::table::{Column, Table};
 use crate::system::format;
@@ -61,7 +62,8 @@ fn to_json(file: &ProbeFile, probe: Option<u32>) -> Value {
         "hashes": "match",
         "file_bytes": file.file_bytes,
         "grid": {
-            "kind": "uniform",
+            "kind": if volume.grid.tree().is_some() { "mixed" } else { "uniform" },
+            "levels": volume.grid.tree().map_or(0, Tree::levels),
             "origin": volume.grid.origin_world().to_array(),
             "spacing": volume.grid.spacing().to_array(),
             "divisions": volume.grid.divisions().to_array(),
@@ -100,7 +102,7 @@ fn to_text(file: &ProbeFile, probe: Option<u32>) -> String {
     let mut out = format!(
         "{FORMAT}, {}, all hashes match\n\
          scene     {} (BLAKE3 {}), seed {}\n\
-         grid      uniform, {} × {} × {} probes, spacing {} m, origin {} m, border {}\n\
+         grid      {}, spacing {} m, origin {} m, border {}\n\
          probes    {} ({active} active, {inside} inside geometry, {unsampled} never sampled)\n\
          irradiance {}\n\
          occlusion  {}\n\
@@ -109,9 +111,7 @@ fn to_text(file: &ProbeFile, probe: Option<u32>) -> String {
         file.scene.name,
         file.scene.blake3,
         file.seed.map_or_else(|| "not known".to_owned(), |seed| seed.to_string()),
-        grid.divisions().x,
-        grid.divisions().y,
-        grid.divisions().z,
+        grid.describe(),
         grid.spacing(),
         grid.origin_world(),
         file.border,

@@ -61,6 +61,7 @@ impl Config {
             rule(key, albedo.to_string(), (0.0..=1.0).contains(&albedo), UNIT_RULE);
         }
         rule("store.border", self.store.border.to_string(), self.store.border <= 1, "use 0 or 1");
+        self.placement.refine.check(&mut rule);
         self.placement.rule.check(&mut rule);
         self.placement.survey.check(&mut rule);
         self.capture.check(MAX_RESOLUTION, &mut rule);

@@ -56,7 +56,7 @@ pub fn gather<'p, F: Fn(usize) -> ProbeCapture + Sync>(
                     .par_iter()
                     .map(|&probe| {
                         let mut capture = trace(probe);
-                        let filtered = occlusion.filter(&std::mem::take(&mut capture.distances));
+                        let filtered = prepared.look(&occlusion, probe, &mut capture);
                         bar.inc(1);
                         (capture, filtered)
                     })

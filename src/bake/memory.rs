@@ -5,7 +5,7 @@ use super::circumstances::BakeError;
 use crate::config::Config;
 use crate::probe::Grid;
 use crate::probe::capture::ProbeCapture;
-use crate::probe::capture::surfel::Surfel;
+use crate::probe::capture::surfel::{PackedNormal, Surfel};
 use crate::probe::place::survey;
 use crate::probe::transport::anderson::History;
 use crate::scene::{Mesh, Scene};
@@ -119,5 +119,6 @@ pub fn surely_fits(config: &Config, scene: &Scene) -> Result<bool, BakeError> {
 
 /// Most that one probe's captured surfaces can take.
 pub fn surfels_bytes(config: &Config) -> u64 {
-    config.capture.rays.count() as u64 * SURFEL_BYTES
+    let geometric = if config.query.needs_geometric() { size_of::<PackedNormal>() as u64 } else { 0 };
+    config.capture.rays.count() as u64 * (SURFEL_BYTES + geometric)
 }

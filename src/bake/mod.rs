@@ -3,6 +3,7 @@
 //! `bake` runs it once; whatever compares configurations runs it many times on one [`World`](crate::light::World).
 
 mod circumstances;
+pub mod convert;
 pub mod figures;
 mod gather;
 mod log;

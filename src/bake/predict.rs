@@ -65,8 +65,7 @@ impl Prepared<'_, '_> {
         let trace = |&probe: &usize| {
             let mut captured = self.trace(&capture, probe);
             // Filtered at once, and not kept.
-            let distances = std::mem::take(&mut captured.distances);
-            std::hint::black_box(occlusion.filter(&distances));
+            std::hint::black_box(self.look(&occlusion, probe, &mut captured));
             captured
         };
         let traced: Vec<ProbeCapture> = pilot.par_iter().map(trace).collect();

@@ -1,8 +1,9 @@
 //! Everything that is decided before captures are traced.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::circumstances::{BakeError, Circumstances};
+use super::convert;
 use super::log::Log;
 use super::memory::Memory;
 use crate::config::{Config, VISIBILITY};
@@ -72,6 +73,7 @@ impl Prepared<'_, '_> {
             settings: &self.config.capture,
             distance_clamp_m: clamp.map(|diagonals| diagonals * self.grid.spacing().length()),
             hit_light: self.config.transport.hit_light(),
+            keeps_geometric: self.config.query.needs_geometric(),
             seed: circumstances.seed,
         }
     }
@@ -83,10 +85,10 @@ impl Prepared<'_, '_> {
 
     /// What collects occlusion while probes are captured.
     pub(super) fn occlusion_builder(&self) -> OcclusionBuilder {
-        let (store, probes) = (&self.config.store, self.grid.probe_count());
+        let store = &self.config.store;
         let occlusion = if self.stores_occlusion() { &store.occlusion } else { &OcclusionStore::None };
         let directions = self.config.capture.rays.directions();
-        occlusion.builder(self.placement.survey.as_ref(), &directions, probes, store.border)
+        occlusion.builder(self.placement.survey.as_ref(), &directions, &self.grid, store.border)
     }
 
     pub(super) fn active(&self) -> Vec<usize> {
@@ -103,6 +105,17 @@ impl Prepared<'_, '_> {
         let capture = Capture { distance_clamp_m: capture.distance_clamp_m.map(|m| m * farther), ..*capture };
         let (low, high) = self.hull;
         capture.probe(self.grid.stream(index) as usize, position, |p| p.cmpge(low).all() && p.cmple(high).all())
+    }
+
+    /// What a probe's occlusion keeps of distances: those of its capture, which lets go of them, or of rays of their own.
+    pub(super) fn look(&self, occlusion: &OcclusionBuilder, probe: usize, captured: &mut ProbeCapture) -> Vec<Vec2> {
+        let mut distances = std::mem::take(&mut captured.distances);
+        if occlusion.has_rays() {
+            let position = self.contacts.viewpoint(probe, self.placement.positions[probe]);
+            distances = convert::distances(self.world, occlusion, probe, position);
+            captured.rays.primary += distances.len() as u64;
+        }
+        occlusion.filter(probe, &distances)
     }
 
     /// The volume before any light is in it.

@@ -238,9 +238,7 @@ fn warn_about(report: &BakeReport, config: &Config, console: &Console) {
         console.say(format!("{count} value(s) of tensor '{tensor}' are too small for its format and stored as 0"));
     }
     if !report.converged && !config.transport.is_limited() {
-        console.warn(
-            "the bounces did not converge; raise transport.bounces.max_iterations or transport.bounces.tolerance",
-        );
+        console.warn(format!("the bounces did not converge; raise {}", config.transport.patience_keys()));
     }
     for (tensor, &count) in numerics.clamped.iter().filter(|c| *c.1 > 0) {
         console.warn(format!("{count} value(s) of tensor '{tensor}' are beyond its format's range and clamped"));

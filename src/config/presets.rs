@@ -20,6 +20,16 @@ pub const PRESETS: &[Preset] = &[
         summary: "as default, but lit by full paths at every hit: the truth at the probes",
         text: include_str!("../../configs/presets/path.ron"),
     },
+    Preset {
+        name: "threev8-uniform",
+        summary: "Three.V8 (Fei Yang 2023): spherical harmonics, tiles of distance",
+        text: include_str!("../../configs/presets/threev8-uniform.ron"),
+    },
+    Preset {
+        name: "threev8-mixed",
+        summary: "the same on a grid that is fine only where surfaces are",
+        text: include_str!("../../configs/presets/threev8-mixed.ron"),
+    },
 ];
 
 /// The preset of a name.

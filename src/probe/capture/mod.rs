@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use self::rays::{Layout, TexelRay};
 pub use self::rays::{OctahedralRays, Rays};
-use self::surfel::Surfel;
+use self::surfel::{PackedNormal, Surfel};
 use crate::light::World;
 use crate::light::emitters::receiver::Receiver;
 use crate::light::lambert::reflected_radiance;
@@ -90,6 +90,8 @@ pub struct ProbeCapture {
     /// Number of texels.
     pub texels: usize,
     pub surfels: Vec<Surfel>,
+    /// Geometric normals of the surfels, towards the probe; empty where no one asks for them.
+    pub geometric: Vec<PackedNormal>,
     /// Texels in which surfaces or the sky emit, with the radiance, weighted against `emitter_samples`, W·m⁻²·sr⁻¹; a
     /// texel may come more than once.
     pub emitted: Vec<(u32, Vec3)>,
@@ -113,6 +115,8 @@ pub struct Capture<'w, 's> {
     /// Distances beyond count as this, and so do misses, metres; `None` where no one asks for distances.
     pub distance_clamp_m: Option<f32>,
     pub hit_light: HitLight,
+    /// Whether geometric normals of hits are kept.
+    pub keeps_geometric: bool,
     pub seed: u64,
 }
 
@@ -203,6 +207,7 @@ impl Capture<'_, '_> {
             self.sample_emitters(index, centre, &layout, &mut out);
         }
         out.surfels.shrink_to_fit();
+        out.geometric.shrink_to_fit();
         out
     }
 
@@ -267,7 +272,7 @@ impl Capture<'_, '_> {
             out.non_finite += 1;
             direct = Vec3::ZERO;
         }
-        out.surfels.push(Surfel::new(surface, direct, ray.texel, ray.share));
+        self.keep(surface, direct, ray, out);
     }
 
     /// Lights a hit with all light there is and keeps it, as a surface that reflects none of the probes' light.
@@ -291,7 +296,15 @@ impl Capture<'_, '_> {
         out.rays.shadow += u64::from(shadow_rays);
         let irradiance = punctual + (sum / f64::from(paths.max(1))).as_vec3();
         let radiance = reflected_radiance(surface.albedo, out.bounded(irradiance));
-        out.surfels.push(Surfel::new(&SurfacePoint { albedo: Vec3::ZERO, ..*surface }, radiance, ray.texel, ray.share));
+        self.keep(&SurfacePoint { albedo: Vec3::ZERO, ..*surface }, radiance, ray, out);
+    }
+
+    #[inline]
+    fn keep(&self, surface: &SurfacePoint, radiance: Vec3, ray: &TexelRay, out: &mut ProbeCapture) {
+        out.surfels.push(Surfel::new(surface, radiance, ray.texel, ray.share));
+        if self.keeps_geometric {
+            out.geometric.push(PackedNormal::of(surface.geometric_normal));
+        }
     }
 
     /// Draws emitters from the probe's centre.
@@ -346,6 +359,7 @@ impl ProbeCapture {
     /// Memory that it takes.
     pub fn bytes(&self) -> u64 {
         (self.surfels.capacity() * size_of::<Surfel>()
+            + self.geometric.capacity() * size_of::<PackedNormal>()
             + self.emitted.capacity() * size_of::<(u32, Vec3)>()
             + self.emitter_samples.capacity() * size_of::<(Vec3, Vec3)>()
             + self.distances.capacity() * size_of::<Moments>()

@@ -4,6 +4,7 @@
 //! comes from, and nothing reads it to shade. Files without `query` are older: [`legacy`] derives it once from `config`.
 
 pub mod legacy;
+pub mod published;
 mod record;
 #[cfg(test)]
 mod tests;
@@ -180,6 +181,12 @@ impl ProbeFile {
     /// The volume relative to its own grid's origin.
     pub fn volume_in_grid(&self) -> &Volume {
         &self.volume_in_grid
+    }
+
+    /// Where the file was made from, with another configuration.
+    pub fn provenance<'a>(&'a self, config: &'a str) -> Provenance<'a> {
+        let ProbeFile { query, scene, plan, border, .. } = self;
+        Provenance { config, query, scene, seed: self.seed.unwrap_or(0), plan, border: *border }
     }
 
     /// The volume without what the plan found unnecessary, should the file hold it all the same.

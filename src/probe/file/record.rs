@@ -40,8 +40,8 @@ pub struct SceneRecord {
 }
 
 /// Version of the metadata key `query` that this program writes. A change of what a look-up does raises it.
-/// 2 added `light.unassigned`.
-pub const QUERY_VERSION: u32 = 2;
+/// 2 added `light.unassigned`; 3 `weights.weight_normal` and `weights.look_up`.
+pub const QUERY_VERSION: u32 = 3;
 
 /// The metadata key `query`: all that a look-up and the shading around it need beside the tensors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,9 +1,10 @@
 //! Tests of the query on volumes built in code.
 //!
-//! [`furnace`] knows the answer under every combination of settings; [`by_hand`] and [`corners`] know it
-//! for each formula alone.
+//! [`furnace`] knows the answer under every combination of settings; [`by_hand`], [`corners`] and [`eccentric`]
+//! know it for each formula alone.
 
 mod by_hand;
 mod corners;
+mod eccentric;
 mod fixture;
 mod furnace;

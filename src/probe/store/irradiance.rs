@@ -198,6 +198,16 @@ impl Irradiance {
         }
     }
 
+    /// That of some probes, in this order.
+    pub fn of_probes(&self, probes: &[usize]) -> Irradiance {
+        match self {
+            Irradiance::Maps { maps, curve, format } => {
+                Irradiance::Maps { maps: maps.of_probes(probes), curve: *curve, format: *format }
+            }
+            Irradiance::Sh9(sh) => Irradiance::Sh9(sh.of_probes(probes)),
+        }
+    }
+
     /// Everything as it is stored, for checkpoints; inverse of [`Self::restore`].
     pub fn stored(&self) -> Box<dyn ExactSizeIterator<Item = Vec3> + '_> {
         match self {

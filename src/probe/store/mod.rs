@@ -13,6 +13,7 @@ pub mod sh;
 pub mod surface;
 #[cfg(test)]
 mod tests;
+pub mod tiles;
 pub mod volume;
 
 use serde::{Deserialize, Serialize};

@@ -187,6 +187,15 @@ impl ShIrradiance {
         probes.for_each(|(map, coefficients)| sample(coefficients, &functions, resolution, map));
     }
 
+    /// Those of some probes, in this order.
+    pub fn of_probes(&self, probes: &[usize]) -> ShIrradiance {
+        ShIrradiance {
+            coefficients: probes.iter().flat_map(|&probe| self.of_probe(probe).iter().copied()).collect(),
+            format: self.format,
+            presampled: self.presampled.as_ref().map(|maps| maps.of_probes(probes)),
+        }
+    }
+
     /// Coefficients, for checkpoints; inverse of [`Self::restore`].
     pub fn stored(&self) -> impl ExactSizeIterator<Item = Vec3> + '_ {
         self.coefficients.iter().map(|&c| c.into())

@@ -2,6 +2,7 @@
 
 pub mod anderson;
 pub mod checkpoint;
+mod in_order;
 pub mod operator;
 mod settings;
 pub mod solver;
@@ -10,7 +11,7 @@ mod tests;
 pub mod truth;
 
 use self::operator::{Captures, Operator};
-pub use self::settings::{Acceleration, BounceSettings, Transport};
+pub use self::settings::{Acceleration, BounceSettings, InOrderSettings, Transport};
 use self::solver::{Progress, Solution};
 use super::Volume;
 
@@ -23,6 +24,9 @@ pub fn run<C: Captures>(
     progress: Progress,
     on_iteration: impl FnMut(&Progress, &Volume),
 ) -> Solution {
-    let solution = solver::solve(operator, &transport.iteration(), volume, progress, on_iteration);
+    let solution = match transport {
+        Transport::InOrder(settings) => in_order::solve(operator, settings, volume, progress, on_iteration),
+        _ => solver::solve(operator, &transport.iteration(), volume, progress, on_iteration),
+    };
     Solution { converged: solution.converged || transport.is_complete(), ..solution }
 }

@@ -65,8 +65,10 @@ impl<C: Captures> Operator<'_, C> {
 
     fn masks_of(&self, volume: &Volume, p: usize) -> Vec<u8> {
         let query = Query { volume, settings: self.query };
-        let mask = |s: &Surfel| query.stored_mask(&self.query_point(s, volume.positions[p]));
-        self.captures.with(p, |capture| capture.surfels.iter().map(mask).collect())
+        self.captures.with(p, |capture| {
+            let mask = |i| query.stored_mask(&self.query_point(capture, i, volume.positions[p]));
+            (0..capture.surfels.len()).map(mask).collect()
+        })
     }
 
     /// Irradiance of every probe from the outgoing radiance that the present irradiance gives; without `masks` from the
@@ -120,32 +122,52 @@ impl<C: Captures> Operator<'_, C> {
 
     /// One application at one active probe, with the masks of its own surfels.
     fn apply_to(&self, volume: &Volume, p: usize, masks: Option<&[u8]>) -> (Vec<Vec3A>, u64) {
-        let kernel = self.kernel;
         let query = Query { volume, settings: self.query };
         self.captures.with(p, |capture| {
-            let mut radiance =
-                if self.gathers_emission { capture.emitted_radiance() } else { vec![Vec3A::ZERO; capture.texels] };
-            let mut non_finite = 0;
-            for (i, surfel) in capture.surfels.iter().enumerate() {
+            let outgoing = |(i, surfel): (usize, &Surfel)| {
                 let mut outgoing = surfel.direct_radiance;
                 if let Some(masks) = masks {
-                    let visibility = match masks[i] {
-                        0 => Visibility::Stored,
-                        mask => Visibility::Exact(mask),
-                    };
-                    let weights = query.weights(&self.query_point(surfel, volume.positions[p]), visibility);
-                    outgoing += reflected_radiance(surfel.albedo(), query.blend(&weights, surfel.oct()));
+                    let point = self.query_point(capture, i, volume.positions[p]);
+                    outgoing += self.reflected(&query, surfel, &point, masks[i]);
                 }
-                if outgoing.is_finite() {
-                    radiance[surfel.texel as usize] += Vec3A::from(outgoing);
-                } else {
-                    non_finite += 1;
-                }
-            }
-            let mut irradiance = vec![Vec3A::ZERO; kernel.rows()];
-            kernel.irradiance(&radiance, &mut irradiance);
-            (irradiance, non_finite)
+                outgoing
+            };
+            self.filter(capture, capture.surfels.iter().enumerate().map(outgoing))
         })
+    }
+
+    /// The same for a probe that is updated alone: all threads share its surfels.
+    pub(super) fn update(&self, volume: &Volume, p: usize, masks: &Masks) -> (Vec<Vec3A>, u64) {
+        /// Surfels that are worth another thread's attention.
+        const CHUNK: usize = 512;
+        let query = Query { volume, settings: self.query };
+        self.captures.with(p, |capture| {
+            let outgoing = |(i, surfel): (usize, &Surfel)| {
+                let point = self.query_point(capture, i, volume.positions[p]);
+                surfel.direct_radiance + self.reflected(&query, surfel, &point, masks.0[p][i])
+            };
+            let outgoing: Vec<Vec3> =
+                capture.surfels.par_iter().enumerate().with_min_len(CHUNK).map(outgoing).collect();
+            self.filter(capture, outgoing.into_iter())
+        })
+    }
+
+    /// A probe's irradiance from the radiance of its surfels, in their order, and how many of these were not finite.
+    #[inline]
+    fn filter(&self, capture: &ProbeCapture, outgoing: impl Iterator<Item = Vec3>) -> (Vec<Vec3A>, u64) {
+        let mut radiance =
+            if self.gathers_emission { capture.emitted_radiance() } else { vec![Vec3A::ZERO; capture.texels] };
+        let mut non_finite = 0;
+        for (surfel, outgoing) in capture.surfels.iter().zip(outgoing) {
+            if outgoing.is_finite() {
+                radiance[surfel.texel as usize] += Vec3A::from(outgoing);
+            } else {
+                non_finite += 1;
+            }
+        }
+        let mut irradiance = vec![Vec3A::ZERO; self.kernel.rows()];
+        self.kernel.irradiance(&radiance, &mut irradiance);
+        (irradiance, non_finite)
     }
 
     /// Seconds that one application at these probes takes.
@@ -157,11 +179,26 @@ impl<C: Captures> Operator<'_, C> {
         started.elapsed().as_secs_f64()
     }
 
-    /// How a probe asks for the light at a surfel. What the method does not look at is left zero.
-    fn query_point(&self, surfel: &Surfel, probe: Vec3) -> QueryPoint {
-        let normal = if self.query.needs_normal() { direction_from_oct(surfel.oct()) } else { Vec3::ZERO };
-        let view = if self.query.needs_view() { (probe - surfel.position).normalize_or_zero() } else { Vec3::ZERO };
-        QueryPoint { position: surfel.position, normal, facing: surfel.facing, view }
+    /// What a surfel reflects of the light in the probes. `mask`: the corners that it sees, 0 where that is not known.
+    #[inline]
+    pub(super) fn reflected(&self, query: &Query, surfel: &Surfel, point: &QueryPoint, mask: u8) -> Vec3 {
+        let visibility = match mask {
+            0 => Visibility::Stored,
+            mask => Visibility::Exact(mask),
+        };
+        let weights = query.weights(point, visibility);
+        reflected_radiance(surfel.albedo(), query.blend(&weights, point, surfel.oct()))
+    }
+
+    /// How a probe asks for the light at one of its surfels. What the method does not look at is left zero.
+    pub(super) fn query_point(&self, capture: &ProbeCapture, surfel: usize, probe: Vec3) -> QueryPoint {
+        let Surfel { position, facing, .. } = capture.surfels[surfel];
+        let normal =
+            if self.query.needs_normal() { direction_from_oct(capture.surfels[surfel].oct()) } else { Vec3::ZERO };
+        let geometric =
+            if self.query.needs_geometric() { direction_from_oct(capture.geometric[surfel].oct()) } else { Vec3::ZERO };
+        let view = if self.query.needs_view() { (probe - position).normalize_or_zero() } else { Vec3::ZERO };
+        QueryPoint { position, normal, geometric, facing, view }
     }
 
     /// Adds the emitted light that probes see themselves: from their rays and from the emitters sampled at their centres.

@@ -9,6 +9,8 @@ use crate::probe::capture::HitLight;
 pub enum Transport {
     /// Through the probes: their irradiance is asked at every hit, bounce after bounce.
     Bounces(BounceSettings),
+    /// Through the probes, one after another, each seeing the new values of those before it.
+    InOrder(InOrderSettings),
     /// By this many full paths from every hit: the truth at the probes, up to resolution and noise.
     Paths { paths: u32 },
 }
@@ -30,6 +32,21 @@ pub struct BounceSettings {
     pub acceleration: Acceleration,
     /// Stop when the bounces still missing are estimated below this share of the largest irradiance.
     pub tolerance: f32,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct InOrderSettings {
+    /// Stop when no probe changes by this share of its largest unknown.
+    pub tolerance: f32,
+    /// Most passes over all probes.
+    pub most: u32,
+}
+
+impl Default for InOrderSettings {
+    fn default() -> Self {
+        InOrderSettings { tolerance: 1e-3, most: 256 }
+    }
 }
 
 /// Whether iterations are combined so that few do for many bounces. With a number of bounces they never are.
@@ -81,7 +98,7 @@ impl Transport {
     pub fn hit_light(&self) -> HitLight {
         match self {
             Transport::Bounces(BounceSettings { max_bounces: Some(0), .. }) => HitLight::None,
-            Transport::Bounces(_) => HitLight::Direct,
+            Transport::Bounces(_) | Transport::InOrder(_) => HitLight::Direct,
             Transport::Paths { paths } => HitLight::Paths(*paths),
         }
     }
@@ -100,7 +117,21 @@ impl Transport {
     pub fn iteration(&self) -> BounceSettings {
         match self {
             Transport::Bounces(settings) => settings.clone(),
+            Transport::InOrder(InOrderSettings { tolerance, most }) => BounceSettings {
+                max_bounces: None,
+                max_iterations: *most,
+                acceleration: Acceleration::Never,
+                tolerance: *tolerance,
+            },
             Transport::Paths { .. } => BounceSettings { max_bounces: Some(1), ..BounceSettings::default() },
+        }
+    }
+
+    /// The keys that let it go on for longer.
+    pub fn patience_keys(&self) -> &'static str {
+        match self {
+            Transport::InOrder(_) => "transport.in_order.most or transport.in_order.tolerance",
+            _ => "transport.bounces.max_iterations or transport.bounces.tolerance",
         }
     }
 
@@ -109,6 +140,10 @@ impl Transport {
         match self {
             Transport::Bounces(settings) => Transport::Bounces(BounceSettings {
                 max_bounces: None,
+                tolerance: (share * settings.tolerance).max(least),
+                ..settings.clone()
+            }),
+            Transport::InOrder(settings) => Transport::InOrder(InOrderSettings {
                 tolerance: (share * settings.tolerance).max(least),
                 ..settings.clone()
             }),
@@ -134,6 +169,13 @@ impl Transport {
                 let holds = tolerance.is_finite() && *tolerance >= 0.0;
                 let text = "use a finite number, not negative";
                 rule("transport.bounces.tolerance", tolerance.to_string(), holds, text);
+            }
+            Transport::InOrder(InOrderSettings { tolerance, most }) => {
+                let holds = tolerance.is_finite() && *tolerance >= 0.0;
+                let text = "use a finite number, not negative";
+                rule("transport.in_order.tolerance", tolerance.to_string(), holds, text);
+                let holds = (1..=1 << 20).contains(most);
+                rule("transport.in_order.most", most.to_string(), holds, "use 1 to 1048576");
             }
             Transport::Paths { paths } => {
                 rule("transport.paths.paths", paths.to_string(), (1..=1 << 20).contains(paths), "use 1 to 1048576");

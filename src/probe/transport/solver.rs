@@ -76,7 +76,7 @@ pub struct Control {
     stalled: u32,
     smallest_residual: Option<f64>,
     /// 2-norm of the last change.
-    last_norm: Option<f64>,
+    pub(super) last_norm: Option<f64>,
 }
 
 /// Between two iterations: what a checkpoint must hold besides the volume's irradiance.

@@ -48,6 +48,7 @@ impl Truth {
                 settings,
                 distance_clamp_m: None,
                 hit_light: HitLight::Paths(paths),
+                keeps_geometric: false,
                 seed: seed.wrapping_add((run + 1).wrapping_mul(SEED_STEP)),
             };
             let probe = |p: usize| -> Vec<Vec3A> {

@@ -10,6 +10,7 @@ use crate::probe::store::encode::ColorFormat;
 use crate::probe::store::irradiance::IrradianceCurve;
 use crate::probe::store::map::OctahedralMaps;
 use crate::probe::store::surface::{Facing, SurfaceVisibility, TableTest};
+use crate::probe::store::tiles::{TileStore, TilesBuilder};
 use crate::probe::store::{Irradiance, Occlusion};
 
 /// Probe (0,0,0), metres. Not the origin, so that a forgotten subtraction shows.
@@ -63,6 +64,16 @@ impl Fixture {
         self.volume.occlusion = Occlusion::Moments(maps);
     }
 
+    /// Mean and deviation of distance as shares of the way to the box of one spacing, by probe, column and row as in
+    /// [`Self::store`].
+    pub fn tiles(&mut self, power: f32, floor: f32, texel: impl Fn(usize, usize, usize) -> [f32; 2]) {
+        self.settings.test = VisibilityTest::Chebyshev { power, floor };
+        let store = TileStore { resolution: RESOLUTION, ..TileStore::default() };
+        let mut tiles = TilesBuilder::new(&store, &self.volume.grid, 1).finish();
+        fill(&mut tiles.maps, |p, c, r| Vec2::from_array(texel(p, c, r)));
+        self.volume.occlusion = Occlusion::Tiles(tiles);
+    }
+
     /// A table of visibility at surfaces with two voxels per axis and cell. For each cell its entries, sorted: key
     /// 6·(x + 2·(y + 2·z)) + facing, and mask. `far`: entry of the whole table, and the probe that stands in.
     pub fn surface(&mut self, cells: &[&[(u16, u8)]], far: &[(u32, u32)]) {
@@ -113,5 +124,5 @@ fn fill<T: Copy>(maps: &mut OctahedralMaps<T>, texel: impl Fn(usize, usize, usiz
 
 /// A point whose surface faces along its shading normal.
 pub fn point(position: Vec3, normal: Vec3, view: Vec3) -> QueryPoint {
-    QueryPoint { position, normal, facing: Facing::of(normal), view }
+    QueryPoint { position, normal, geometric: normal, facing: Facing::of(normal), view }
 }

@@ -8,6 +8,8 @@ pub mod figures;
 mod gather;
 mod log;
 mod memory;
+#[cfg(test)]
+mod mixed_tests;
 mod pipeline;
 mod predict;
 mod prepared;

@@ -133,9 +133,11 @@ impl Prepared<'_, '_> {
     /// Bytes per probe in the layout that shading uses: in full, and after the plan.
     pub(super) fn runtime_bytes(&self) -> (f64, f64) {
         let (store, probes) = (&self.config.store, self.grid.probe_count());
-        let head = head_bytes(self.config.placement.rule.moves()) + store.irradiance.runtime_bytes(store.border);
+        let moved = self.config.placement.rule.moves();
+        let head = (head_bytes(moved) + store.irradiance.runtime_bytes(store.border)) as f64;
+        let head = head + self.grid.runtime_bytes(moved);
         let survey = self.placement.survey.as_ref();
-        let full = head as f64 + store.occlusion.runtime_bytes(store.border, survey, probes);
-        (full, if self.plan.visibility { full } else { head as f64 })
+        let full = head + store.occlusion.runtime_bytes(store.border, survey, probes);
+        (full, if self.plan.visibility { full } else { head })
     }
 }

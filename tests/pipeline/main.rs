@@ -22,3 +22,4 @@ mod reference;
 mod reports;
 mod shapes;
 mod skies;
+mod threev8;

@@ -146,6 +146,17 @@ impl Grid {
         self.spacing.min_element()
     }
 
+    /// Bytes per probe that a look-up reads to find probes, besides their places where these are stored anyway: in mixed grids
+    /// the index, and every probe's level and place.
+    pub fn runtime_bytes(&self, stores_places: bool) -> f64 {
+        const ENTRY_BYTES: usize = 4;
+        const LEVEL_BYTES: usize = 4;
+        const PLACE_BYTES: usize = 12;
+        let Some(tree) = &self.tree else { return 0.0 };
+        let places = if stores_places { 0 } else { PLACE_BYTES };
+        (ENTRY_BYTES * tree.index().len()) as f64 / tree.probe_count() as f64 + (LEVEL_BYTES + places) as f64
+    }
+
     /// Kind and size in words.
     pub fn describe(&self) -> String {
         let [x, y, z] = self.divisions.to_array();

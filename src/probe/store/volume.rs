@@ -40,6 +40,7 @@ impl Volume {
 
     /// Bytes per probe in the layout that shading uses; `moved`: whether positions are stored beside the grid's.
     pub fn runtime_bytes(&self, moved: bool) -> f64 {
-        (head_bytes(moved) + self.irradiance.runtime_bytes()) as f64 + self.occlusion.runtime_bytes(self.states.len())
+        let own = (head_bytes(moved) + self.irradiance.runtime_bytes()) as f64;
+        own + self.grid.runtime_bytes(moved) + self.occlusion.runtime_bytes(self.states.len())
     }
 }

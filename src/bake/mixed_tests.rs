@@ -142,7 +142,7 @@ fn mixed_grids_bake_with_every_store_and_placement() {
     // One base cell stays whole where the sheets are not: three levels of 4 points make one base cell; two levels of points
     // beyond them make more.
     let wide = "grid.divisions=(8,4,4)";
-    let bounds = "grid.bounds=(min:(0,0,0),max:(7,3,3))";
+    let bounds = "grid.bounds={\"min\":[0,0,0],\"max\":[7,3,3]}";
     for words in [
         vec![
             "store.occlusion=surface()",
@@ -225,7 +225,7 @@ fn an_interrupted_pass_is_resumed() {
 #[test]
 fn a_mixed_volume_becomes_uniform() {
     let scene = crossed_room();
-    let words = ["grid.divisions=(8,4,4)", "grid.bounds=(min:(0,0,0),max:(7,3,3))"];
+    let words = ["grid.divisions=(8,4,4)", "grid.bounds={\"min\":[0,0,0],\"max\":[7,3,3]}"];
     let mixed = bake(&scene, &[&words[..], &["placement.refine=mixed(levels: 2)"]].concat()).volume;
     let uniform = bake(&scene, &words).volume;
     let world = World::new(&scene, 1.0, 0.999).unwrap();

@@ -57,8 +57,8 @@ impl Grid {
         Grid::refined(settings, Refine::Uniform, scene)
     }
 
-    /// A grid that is refined where `refine` says so: its finest cells are those of the uniform grid of the same settings,
-    /// with so many more along each axis that whole base cells cover it.
+    /// A grid that is refined where `refine` says so: its points are those of the uniform grid of the same settings, with so
+    /// many more along each axis that they fill whole base cells.
     ///
     /// # Errors
     /// The settings make none.

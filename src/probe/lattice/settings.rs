@@ -111,13 +111,16 @@ impl GridSettings {
                 cover(high - low, spacing, padding)?
             }
         };
-        let divisions = UVec3::from(divisions.to_array().map(|n| n.div_ceil(whole).saturating_mul(whole)));
+        let asked = divisions;
+        let divisions = UVec3::from(asked.to_array().map(|n| n.div_ceil(whole).saturating_mul(whole)));
         // Exact as far as it is compared, and beyond that not wrapped.
         let count: f64 = divisions.to_array().iter().map(|&n| f64::from(n)).product();
         if count > MAX_PROBES as f64 {
             return Err(GridError::TooMany(count));
         }
-        let origin = (low + high) / 2.0 - spacing * (divisions - UVec3::ONE).as_dvec3() / 2.0;
+        let first = (low + high) / 2.0 - spacing * (asked - UVec3::ONE).as_dvec3() / 2.0;
+        // Those that were asked for keep their places; as many more on either side, but for an odd one.
+        let origin = first - spacing * ((divisions - asked) / 2).as_dvec3();
         Ok(Layout { origin, spacing, divisions })
     }
 }

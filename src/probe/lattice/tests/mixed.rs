@@ -8,7 +8,7 @@ use glam::{DVec3, UVec3, Vec3};
 use super::super::Refine;
 use super::super::grid::{CellIndex, GridSettings, ProbeIndex};
 use super::super::tree::Tree;
-use super::Grid;
+use crate::probe::lattice::Grid;
 use crate::scene::{self, LoadOptions, Scene, TriangleIndex};
 
 const LEVELS: u32 = 3;
@@ -203,6 +203,9 @@ fn base_cells_cover_the_uniform_grid_at_its_spacing() {
         assert_eq!(grid.divisions() % 4, UVec3::ZERO);
         let more = grid.divisions() - uniform.divisions();
         assert!(more.cmplt(UVec3::splat(4)).all(), "{more}");
+        // Its points are among those of the mixed grid.
+        let steps = (uniform.origin_world() - grid.origin_world()) / grid.spacing().as_dvec3();
+        assert!((steps - (more / 2).as_dvec3()).abs().max_element() < 1e-6, "{steps}");
         let ((low, high), (inner_low, inner_high)) = (grid.hull(1e-3), uniform.hull(0.0));
         assert!(low.cmple(inner_low).all() && high.cmpge(inner_high).all());
     }

@@ -101,9 +101,9 @@ fn light_may_be_looked_up_where_it_comes_from() {
     fixture.store(IrradianceCurve::Linear, |i, c, r| [(i + 1) as f32, c as f32, r as f32]);
     fixture.settings.look_up = LookUp::Towards;
     let point = asking();
-    for probe in 0..8 {
+    for (probe, mean) in MEANS.into_iter().enumerate() {
         // Along n = (2, 3, 6)/7 the way to the box is min(2·7/2, 4·7/3, 1·7/6) = 7/6.
-        let mean = MEANS[probe] * 7.0 / 6.0;
+        let mean = mean * 7.0 / 6.0;
         let target = P + mean * point.normal - fixture.volume.positions[probe];
         let expected = fixture.volume.irradiance.of(probe, target.normalize());
         let found = Vec3::from(fixture.look_up(&point, Visibility::Exact(1 << probe)));

@@ -15,7 +15,8 @@ use crate::probe::transport::truth::Truth;
 use crate::report::baked::{self, BakedReport};
 use crate::report::reference_layers::ReferenceLayers;
 use crate::report::render::{MethodReport, Timing};
-use crate::report::{error, leak};
+use crate::report::{air, error, leak};
+use crate::shade::air::{Air, AirTruth};
 use crate::shade::layers::compose;
 use crate::shade::points::View;
 use crate::shade::regions::Region;
@@ -31,6 +32,8 @@ pub struct Scenery<'a, 's> {
     pub view: &'a View,
     /// Time of the primary rays.
     pub primary_s: f64,
+    /// Of the points in the air.
+    pub seed: u64,
 }
 
 /// The picture and the figures of one visibility mode.
@@ -38,6 +41,8 @@ pub struct Shaded {
     pub mode: VisibilityMode,
     /// At every point of the view, W·m⁻².
     pub irradiance: Vec<Vec3>,
+    /// At every point of the air, W·m⁻².
+    pub in_air: Vec<Vec3>,
     pub report: MethodReport,
     pub image: LayeredImage,
 }
@@ -53,6 +58,15 @@ pub struct Comparison<'a> {
     pub seed: u64,
 }
 
+/// What rays found out about the points that ask some probes.
+#[derive(Clone, Copy)]
+pub struct Seen<'a> {
+    /// Which probes the view's points see, and the seconds that it took to find out.
+    pub masks: &'a [u8],
+    pub masks_s: f64,
+    pub air: &'a Air,
+}
+
 impl Scenery<'_, '_> {
     /// Which probes the view's points see, and the seconds that it took to find out.
     pub fn masks(&self, query: &Query) -> (Vec<u8>, f64) {
@@ -61,18 +75,25 @@ impl Scenery<'_, '_> {
         (masks, started.elapsed().as_secs_f64())
     }
 
+    /// Points of free air, and which probes they see.
+    pub fn air(&self, query: &Query) -> Air {
+        Air::new(self.world, query, self.seed)
+    }
+
     /// The three ways of treating visibility; `step` is called after each.
     pub fn shade(
         &self,
         query: &Query,
-        masks: &[u8],
-        masks_s: f64,
+        Seen { masks, masks_s, air }: Seen,
         bytes_per_probe: f64,
         step: impl Fn(),
     ) -> [Shaded; 3] {
         let points = &self.view.points;
         let exact = irradiance(query, points, masks, VisibilityMode::Ray);
+        let exact_in_air = air.irradiance(query, VisibilityMode::Ray);
+        let outside_hull = outside_hull(query, self.view);
         VisibilityMode::ALL.map(|mode| {
+            let in_air = air.irradiance(query, mode);
             let irradiance = irradiance(query, points, masks, mode);
             let lookup = Some(time_lookup(query, points, masks, mode)).filter(|runs| !runs.is_empty()).map(Timing::of);
             let ray_s = if mode == VisibilityMode::Ray { self.primary_s + masks_s } else { self.primary_s };
@@ -85,11 +106,13 @@ impl Scenery<'_, '_> {
                 bytes_per_probe,
                 irradiance_indirect_mean: mean_luminance(self.view, &irradiance),
                 leak: leak::measure(query, points, masks, mode, &irradiance, &exact),
+                outside_hull,
+                air: air::measure(air, &in_air, &exact_in_air),
                 error: None,
                 error_gltf: None,
             };
             step();
-            Shaded { mode, image: compose(self.view, &irradiance), irradiance, report }
+            Shaded { mode, image: compose(self.view, &irradiance), irradiance, in_air, report }
         })
     }
 
@@ -97,13 +120,14 @@ impl Scenery<'_, '_> {
     pub fn shade_again(
         &self,
         query: &Query,
-        masks: &[u8],
+        Seen { masks, air, .. }: Seen,
         mode: VisibilityMode,
         name: &'static str,
         like: &MethodReport,
     ) -> Shaded {
         let points = &self.view.points;
         let shown = irradiance(query, points, masks, mode);
+        let (in_air, exact_in_air) = (air.irradiance(query, mode), air.irradiance(query, VisibilityMode::Ray));
         let exact = if mode == VisibilityMode::Ray {
             shown.clone()
         } else {
@@ -113,9 +137,10 @@ impl Scenery<'_, '_> {
             name,
             irradiance_indirect_mean: mean_luminance(self.view, &shown),
             leak: leak::measure(query, points, masks, mode, &shown, &exact),
+            air: air::measure(air, &in_air, &exact_in_air),
             ..like.clone()
         };
-        Shaded { mode, image: compose(self.view, &shown), irradiance: shown, report }
+        Shaded { mode, image: compose(self.view, &shown), irradiance: shown, in_air, report }
     }
 }
 
@@ -141,6 +166,26 @@ impl Shaded {
         }
         self.report.leak.dark_region = dark_region;
     }
+
+    /// Adds the error in the air.
+    pub fn compare_in_air(&mut self, truth: &AirTruth) {
+        self.report.air.compare(&self.in_air, truth);
+    }
+}
+
+/// Share of the view's points outside the probes' hull.
+fn outside_hull(query: &Query, view: &View) -> Option<f64> {
+    /// Points on the hull's faces lie inside, whatever rounding makes of them; spacings.
+    const TOLERANCE: f32 = 1e-4;
+    let (low, high) = query.volume.grid.hull(TOLERANCE);
+    let is_outside = |p: Vec3| p.cmplt(low).any() || p.cmpgt(high).any();
+    let (mut outside, mut all) = (0.0f64, 0.0f64);
+    for point in &view.points {
+        let weight = f64::from(point.weight);
+        outside += if is_outside(point.surface.position) { weight } else { 0.0 };
+        all += weight;
+    }
+    (all > 0.0).then(|| outside / all)
 }
 
 /// Mean over the pixels that show a surface.

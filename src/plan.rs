@@ -29,6 +29,8 @@ pub struct Plan {
     pub lines: Vec<Line>,
     /// Whether the visibility factor can differ from 1 for any surface.
     pub visibility: bool,
+    /// Whether levels of radiance for glossy surfaces are stored.
+    pub radiance_levels: bool,
 }
 
 impl Plan {
@@ -41,7 +43,7 @@ impl Plan {
             sky(scene),
             alpha(scene),
             textures(scene),
-            glossy(scene),
+            glossy(scene, config),
             unsampled(config, placement),
         ];
         // The survey knows nothing of surfaces beyond the probes' hull.
@@ -54,17 +56,18 @@ impl Plan {
             line.reason = format!("kept by configuration; {}", line.reason);
             (line.kept, line.saved_bytes, line.saved_s) = (true, None, None);
         }
-        Plan { lines, visibility }
+        let radiance_levels = lines.iter().any(|l| l.stage == RADIANCE_LEVELS && l.kept);
+        Plan { lines, visibility, radiance_levels }
     }
 
     /// Adds the line about bounces, known only afterwards: `done` iterations in `bounces_s` seconds.
     pub fn add_bounces(&mut self, done: u32, transport: &Transport, converged: bool, bounces_s: f64) {
-        let limit = transport.iteration().max_bounces;
+        let limit = transport.max_bounces();
         let saved = limit.map_or(0, |most| most.saturating_sub(done));
         let per_bounce = bounces_s / f64::from(done.max(1));
         let reason = match limit {
             _ if transport.is_complete() => "every captured hit holds all light already".to_owned(),
-            _ if converged => format!("{done} iterations; what further bounces would add is below the tolerance"),
+            _ if converged => transport.settled_words(done),
             Some(most) => format!("all {most} bounces that were asked for; the tolerance was not reached"),
             None => format!("all {done} iterations; the tolerance was not reached"),
         };
@@ -122,14 +125,20 @@ fn textures(scene: &Scene) -> Line {
     }
 }
 
-/// No method so far stores radiance; the line is there because its readers look for it.
-fn glossy(scene: &Scene) -> Line {
+/// The stage of levels of radiance for glossy surfaces.
+const RADIANCE_LEVELS: &str = "radiance_levels";
+
+fn glossy(scene: &Scene, config: &Config) -> Line {
     let glossy = scene.materials.iter().filter(|m| !m.unlit && (m.metallic > 0.0 || m.roughness < 1.0)).count();
-    let reason = match glossy {
-        0 => "no glossy material".to_owned(),
-        n => format!("{n} glossy material(s), but the method stores irradiance only"),
-    };
-    line("radiance_levels", false, reason)
+    let levels = config.store.prefiltered.len();
+    match glossy {
+        0 => line(RADIANCE_LEVELS, false, "no glossy material"),
+        n if levels == 0 => {
+            let reason = format!("{n} glossy material(s), but the method stores irradiance only");
+            line(RADIANCE_LEVELS, false, reason)
+        }
+        n => line(RADIANCE_LEVELS, true, format!("{n} glossy material(s), {levels} level(s)")),
+    }
 }
 
 fn unsampled(config: &Config, placement: &Placement) -> Line {
@@ -147,7 +156,8 @@ fn visibility_line(config: &Config, placement: &Placement, kept: bool, blocked: 
         _ if kept => line(VISIBILITY, true, "kept by configuration; every surface sees all probes around it"),
         _ => {
             let probes = placement.states.len();
-            let per_probe = occlusion.runtime_bytes(config.store.border, placement.survey.as_ref(), probes);
+            let per_probe =
+                occlusion.runtime_bytes(config.store.border, placement.survey.as_ref(), probes, &config.store.layout);
             let saved_bytes = Some((per_probe * probes as f64).round() as u64);
             Line { saved_bytes, ..line(VISIBILITY, false, "every surface sees all probes around it") }
         }

@@ -101,6 +101,8 @@ fn filter_and_bounce(criterion: &mut Criterion) {
         distance_clamp_m: None,
         hit_light: config.transport.hit_light(),
         keeps_geometric: false,
+        sees: false,
+        resampling: None,
         seed: 1,
     };
     let captures: Vec<ProbeCapture> =

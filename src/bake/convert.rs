@@ -15,7 +15,7 @@ use crate::trace::Ray;
 /// stands for, distances are those of probes that stand for one cell, and are traced again for the others.
 ///
 /// # Errors
-/// The grid is uniform already, or visibility is held in a form that a new place would have to be surveyed for.
+/// The grid is uniform already, or visibility or radiance is held in a form that a new place would have to be surveyed for.
 pub fn to_uniform(world: &World, volume: &Volume) -> Result<Volume, String> {
     let mixed = &volume.grid;
     let Some(tree) = mixed.tree() else { return Err("its grid is uniform already".to_owned()) };
@@ -27,10 +27,15 @@ pub fn to_uniform(world: &World, volume: &Volume) -> Result<Volume, String> {
         .zip(&sources)
         .map(|(probe, &source)| if is_own(source) { volume.positions[source] } else { grid.grid_point(probe) })
         .collect();
+    if !volume.radiance.is_empty() {
+        return Err("its radiance belongs to its probes; bake with placement.refine=uniform instead".to_owned());
+    }
     let mut converted = Volume {
         states: sources.iter().map(|&source| volume.states[source]).collect(),
         irradiance: volume.irradiance.of_probes(&sources),
         occlusion: Occlusion::None,
+        radiance: volume.radiance.clone(),
+        layout: volume.layout.clone(),
         positions,
         grid,
     };

@@ -4,9 +4,10 @@
 use super::circumstances::BakeError;
 use crate::config::Config;
 use crate::probe::Grid;
-use crate::probe::capture::ProbeCapture;
 use crate::probe::capture::surfel::{PackedNormal, Surfel};
+use crate::probe::capture::{ProbeCapture, Seen};
 use crate::probe::place::survey;
+use crate::probe::store::radiance::LightFieldStore;
 use crate::probe::transport::anderson::History;
 use crate::scene::{Mesh, Scene};
 use crate::system::memory::{TooLittleMemory, available_bytes};
@@ -40,16 +41,22 @@ impl Memory {
         let probes = grid.probe_count() as u64;
         let unknowns = store.irradiance.unknowns();
         let (distance_kernel, distances) = store.occlusion.filter_bytes(texels);
-        let iteration = config.transport.iteration();
-        let history = if iteration.may_accelerate() { History::bytes(probes * unknowns as u64) } else { 0 };
-        let per_probe = store.irradiance.working_bytes(store.border) + store.occlusion.working_bytes(store.border);
+        let history = if config.transport.may_accelerate() { History::bytes(probes * unknowns as u64) } else { 0 };
+        let radiance = store.radiance().working_bytes(config.capture.rays.side().unwrap_or(0));
+        // The last reflection, the one that is being traced, and their sum.
+        let traced = if config.transport.needs_light_field() { 3 * size_of::<glam::Vec3>() * texels } else { 0 } as u64;
+        let per_probe = store.irradiance.working_bytes(store.border)
+            + store.occlusion.working_bytes(store.border)
+            + radiance
+            + traced;
+        let (resampling, resampled) = config.capture.rays.resampling_bytes();
         let survey = store.occlusion.survey_voxels();
         Memory {
             probes: probes * PROBE_BYTES,
             survey: survey.map_or(0, |voxels| survey::estimated_bytes(mesh, grid, voxels)),
-            kernels: store.irradiance.filter_bytes(texels) + distance_kernel,
+            kernels: store.irradiance.filter_bytes(texels) + distance_kernel + resampling,
             maps: probes * per_probe + history,
-            in_flight: (surfels_bytes(config) + distances) * rayon::current_num_threads() as u64,
+            in_flight: (surfels_bytes(config) + distances + resampled) * rayon::current_num_threads() as u64,
         }
     }
 
@@ -113,12 +120,14 @@ pub fn check(config: &Config, scene: &Scene) -> Result<(), BakeError> {
 /// [`BakeError::Grid`].
 pub fn surely_fits(config: &Config, scene: &Scene) -> Result<bool, BakeError> {
     let grid = Grid::refined(&config.grid, config.placement.refine, scene)?;
-    let captures = (grid.probe_count() as u64).saturating_mul(surfels_bytes(config));
+    let kept = if config.transport.captures_once() { surfels_bytes(config) } else { 0 };
+    let captures = (grid.probe_count() as u64).saturating_mul(kept);
     Ok(Memory::of(config, &grid, &scene.mesh).check(config, captures).is_ok())
 }
 
 /// Most that one probe's captured surfaces can take.
 pub fn surfels_bytes(config: &Config) -> u64 {
     let geometric = if config.query.needs_geometric() { size_of::<PackedNormal>() as u64 } else { 0 };
-    config.capture.rays.count() as u64 * (SURFEL_BYTES + geometric)
+    let seen = if config.store.light_field == LightFieldStore::None { 0 } else { size_of::<Seen>() as u64 };
+    config.capture.rays.kept() as u64 * (SURFEL_BYTES + geometric) + config.capture.rays.texels() as u64 * seen
 }

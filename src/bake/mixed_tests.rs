@@ -142,7 +142,7 @@ fn mixed_grids_bake_with_every_store_and_placement() {
     // One base cell stays whole where the sheets are not: three levels of 4 points make one base cell; two levels of points
     // beyond them make more.
     let wide = "grid.divisions=(8,4,4)";
-    let bounds = "grid.bounds={\"min\":[0,0,0],\"max\":[7,3,3]}";
+    let bounds = "grid.bounds=(min:(0,0,0),max:(7,3,3))";
     for words in [
         vec![
             "store.occlusion=surface()",
@@ -153,6 +153,20 @@ fn mixed_grids_bake_with_every_store_and_placement() {
         vec!["store.occlusion=moments()", "placement.rule=settle()"],
         vec!["store.occlusion=tiles()", "store.irradiance=octahedral()"],
         vec!["store.occlusion=none", "query.test=none"],
+        // Frames have no captures beforehand, and tiles rays of their own all the same.
+        vec![
+            "store.irradiance=octahedral()",
+            "transport=frames(hysteresis: 0.5, least: 4, window: 4)",
+            "capture.emission=gathered",
+            "placement.rule=ddgi(rays: 16)",
+        ],
+        vec![
+            "transport=in_order()",
+            "capture.rays=cube(face: 24, resolution: 16)",
+            "store.light_field=maps",
+            "store.prefiltered=[16, 8]",
+            "plan.keep=[\"radiance_levels\"]",
+        ],
     ] {
         let words = [&words[..], &[wide, bounds, "placement.refine=mixed(levels: 2)"]].concat();
         // A store and its test are set together.
@@ -169,6 +183,18 @@ fn mixed_grids_bake_with_every_store_and_placement() {
             .filter(|p| Query { volume, settings: &settings }.irradiance(p, Visibility::Off).min_element() > 0.0);
         // Probes that see mostly backs of the sheets, which have one side, count as inside them where they settle.
         assert!(lit.count() > 150, "{words:?}: most points are lit");
+        let active: Vec<usize> = volume.active().collect();
+        if let Some(tiles) = volume.occlusion.tiles() {
+            assert!(active.iter().all(|&p| tiles.maps.probe(p).iter().all(|t| t.x > 0.0)), "{words:?}");
+        }
+        assert_eq!(volume.radiance.light_field.is_some(), words.contains(&"store.light_field=maps"));
+        if let Some(field) = &volume.radiance.light_field {
+            // Within the room all that is seen glows or is lit.
+            let mut within = active.iter().filter(|&&p| volume.positions[p].x < 3.5);
+            assert!(within.all(|&p| field.radiance.probe(p).iter().all(|l| l.min_element() > 0.0)));
+            let world = World::new(&scene, 1.0, 0.999).unwrap();
+            assert!(convert::to_uniform(&world, volume).unwrap_err().contains("radiance"));
+        }
     }
 }
 
@@ -226,7 +252,7 @@ fn an_interrupted_pass_is_resumed() {
 #[test]
 fn a_mixed_volume_becomes_uniform() {
     let scene = crossed_room();
-    let words = ["grid.divisions=(8,4,4)", "grid.bounds={\"min\":[0,0,0],\"max\":[7,3,3]}"];
+    let words = ["grid.divisions=(8,4,4)", "grid.bounds=(min:(0,0,0),max:(7,3,3))"];
     let mixed = bake(&scene, &[&words[..], &["placement.refine=mixed(levels: 2)"]].concat()).volume;
     let uniform = bake(&scene, &words).volume;
     let world = World::new(&scene, 1.0, 0.999).unwrap();

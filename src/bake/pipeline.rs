@@ -9,7 +9,6 @@ use super::log::Log;
 use super::prepared::Prepared;
 use crate::plan::{Line, Plan};
 use crate::probe::Volume;
-use crate::probe::capture::ProbeCapture;
 use crate::probe::container::{Container, FileError};
 use crate::probe::file::{self, Provenance, SceneRecord};
 use crate::probe::lattice::ProbeState;
@@ -48,11 +47,10 @@ impl Prepared<'_, '_> {
         log.numerics.light_clamped += self.world.scene.light_clamped;
 
         let capture = self.capture(circumstances);
-        let trace = |probe: usize| self.trace(&capture, probe);
-        let (captures, occlusion) = gather(&self, &trace, circumstances, &mut log);
-        // What neither bounces nor shading ask for is only stored.
-        let (asked, unasked) =
-            if self.plan.visibility { (occlusion, None) } else { (Occlusion::None, Some(occlusion)) };
+        let (captures, occlusion) = gather(&self, &capture, circumstances, &mut log);
+        // What neither bounces nor shading ask for is only stored. Frames make it as they go, and so ask it.
+        let asks = self.plan.visibility || !config.transport.captures_once();
+        let (asked, unasked) = if asks { (occlusion, None) } else { (Occlusion::None, Some(occlusion)) };
         let mut volume = self.volume(asked);
         let solution = self.transport(&captures, &mut volume, circumstances, scene, &mut log)?;
         let mut plan = self.plan.clone();
@@ -68,17 +66,16 @@ impl Prepared<'_, '_> {
     }
 
     /// Brings light from surface to surface until it has settled; saves it now and then.
-    fn transport<F: Fn(usize) -> ProbeCapture + Sync>(
+    fn transport(
         &self,
-        captures: &Budgeted<F>,
+        captures: &Budgeted,
         volume: &mut Volume,
         circumstances: &Circumstances,
         scene: &SceneRecord,
         log: &mut Log,
     ) -> Result<Solution, BakeError> {
         let config = self.config;
-        let kernel =
-            log.time(|times| &mut times.filter, || volume.irradiance.kernel(&config.capture.rays.directions()));
+        let kernel = log.time(|times| &mut times.filter, || self.kernel(volume));
         let operator = Operator {
             captures,
             kernel: &kernel,
@@ -92,11 +89,12 @@ impl Prepared<'_, '_> {
         {
             progress = checkpoint::read(path, &identity, volume)?;
         }
-        let most = config.transport.iteration().most() as usize;
+        let most = config.transport.most() as usize;
+        let captures_once = config.transport.captures_once();
         let mut saver = Saver::new(circumstances.checkpoint.as_ref(), &identity);
         let solution = log.stage(
-            |times| &mut times.bounces,
-            "bounces",
+            |times| if captures_once { &mut times.bounces } else { &mut times.capture },
+            if captures_once { "bounces" } else { "frames" },
             most,
             |bar| {
                 transport::run(&config.transport, &operator, volume, progress, |progress, volume| {
@@ -108,7 +106,11 @@ impl Prepared<'_, '_> {
             },
         );
         saver.saved?;
+        log.rays.primary += solution.rays.0;
+        log.rays.shadow += solution.rays.1;
         log.numerics.non_finite += solution.non_finite;
+        log.numerics.hits_outside_volume += solution.hits_outside_volume;
+        log.numerics.light_clamped += solution.light_clamped;
         Ok(solution)
     }
 
@@ -147,6 +149,7 @@ impl<'a> Saver<'a> {
         if let Some(Checkpoint { path, interval, .. }) = self.checkpoint
             && self.last.elapsed() >= *interval
             && self.saved.is_ok()
+            && !progress.is_partial
         {
             self.saved = checkpoint::write(path, self.identity, progress, volume);
             self.last = Instant::now();

@@ -63,7 +63,10 @@ impl Prepared<'_, '_> {
         let occlusion = self.occlusion_builder();
         let started = Instant::now();
         let trace = |&probe: &usize| {
-            let mut captured = self.trace(&capture, probe);
+            let mut captured = match config.transport.captures_once() {
+                true => self.trace(&capture, probe),
+                false => self.frame(&capture, probe, 0),
+            };
             // Filtered at once, and not kept.
             std::hint::black_box(self.look(&occlusion, probe, &mut captured));
             captured
@@ -80,12 +83,11 @@ impl Prepared<'_, '_> {
 
         let mut stored: Vec<Option<ProbeCapture>> = (0..self.grid.probe_count()).map(|_| None).collect();
         pilot.iter().zip(traced).for_each(|(&probe, capture)| stored[probe] = Some(capture));
-        let trace = |probe: usize| self.trace(&capture, probe);
         let occlusion = if self.plan.visibility { occlusion.finish() } else { Occlusion::None };
         let volume = self.volume(occlusion);
-        let kernel = volume.irradiance.kernel(&config.capture.rays.directions());
+        let kernel = volume.irradiance.kernel(&self.capture.rays.directions());
         let operator = Operator {
-            captures: &Budgeted { stored, trace: &trace },
+            captures: &Budgeted { stored, prepared: self, capture: &capture },
             kernel: &kernel,
             query: &config.query,
             gathers_emission: false,
@@ -95,12 +97,15 @@ impl Prepared<'_, '_> {
         if bytes > 0.0 && bytes > budget as f64 {
             retraced_s = capture_s * (1.0 - budget as f64 / bytes);
         }
+        let bounce_s = operator.time(&volume, &pilot) * share;
+        // Frames are captured anew, and none is kept.
+        let once = config.transport.captures_once();
         Prediction {
             survey_s: self.survey_s,
-            capture_s,
-            bounce_s: operator.time(&volume, &pilot) * share + retraced_s,
-            bounces: config.transport.iteration().expected_iterations(ratio),
-            capture_bytes: (bytes as u64).min(budget),
+            capture_s: if once { capture_s } else { 0.0 },
+            bounce_s: bounce_s + if once { retraced_s } else { capture_s },
+            bounces: config.transport.expected_iterations(ratio),
+            capture_bytes: if once { (bytes as u64).min(budget) } else { 0 },
             map_bytes: self.memory.standing(),
             resident_bytes,
             survey_bytes,
@@ -109,6 +114,9 @@ impl Prepared<'_, '_> {
 
     /// Refuses a bake whose captures do not fit beside its maps.
     pub fn check_memory(&self, circumstances: &Circumstances) -> Result<(), TooLittleMemory> {
+        if !self.config.transport.captures_once() {
+            return self.memory.check(self.config, 0);
+        }
         let budget = circumstances.memory_budget_bytes.unwrap_or(u64::MAX);
         let most = (self.active().len() as u64).saturating_mul(surfels_bytes(self.config));
         let checked = self.memory.check(self.config, most.min(budget));

@@ -10,11 +10,13 @@ use crate::config::{Config, VISIBILITY};
 use crate::light::World;
 use crate::light::contact::Contacts;
 use crate::plan::Plan;
-use crate::probe::capture::{Capture, ProbeCapture};
+use crate::probe::capture::{Capture, CaptureSettings, ProbeCapture, Resampling};
 use crate::probe::lattice::ProbeState;
 use crate::probe::place::{Placement, PlacementSettings, PlacementTask, place};
+use crate::probe::store::kernel::Kernel;
 use crate::probe::store::occlusion::OcclusionBuilder;
-use crate::probe::store::{Occlusion, OcclusionStore, head_bytes};
+use crate::probe::store::radiance::{LightFieldStore, RadianceStore};
+use crate::probe::store::{Occlusion, OcclusionStore};
 use crate::probe::{Grid, ProbeIndex, Volume};
 
 /// Hits this far outside the hull of the probes, in spacings, still count as inside: rounding of the bounds.
@@ -31,6 +33,9 @@ pub struct Prepared<'w, 's> {
     pub plan: Plan,
     pub survey_s: f64,
     pub(super) memory: Memory,
+    /// The configuration's, less the rays that placement keeps for itself.
+    pub(super) capture: CaptureSettings,
+    resampling: Option<Resampling>,
     /// Hull of the probes relative to the scene's origin, a little enlarged.
     hull: (Vec3, Vec3),
 }
@@ -62,7 +67,11 @@ pub fn prepare<'w, 's>(
     let plan = Plan::new(world, config, &grid, &placement);
     let hull = grid.hull(HULL_TOLERANCE);
     let contacts = Contacts::of_points(world.scene, &placement.positions);
-    Ok(Prepared { world, config, grid, placement, contacts, plan, survey_s: log.times.survey, memory, hull })
+    let rays = config.capture.rays.without(config.placement.rule.reserved_rays());
+    let capture = CaptureSettings { rays, ..config.capture.clone() };
+    let resampling = log.time(|times| &mut times.filter, || capture.rays.resampling());
+    let survey_s = log.times.survey;
+    Ok(Prepared { world, config, grid, placement, contacts, plan, survey_s, memory, capture, resampling, hull })
 }
 
 impl Prepared<'_, '_> {
@@ -70,10 +79,12 @@ impl Prepared<'_, '_> {
         let clamp = self.config.store.occlusion.distance_clamp().filter(|_| self.stores_occlusion());
         Capture {
             world: self.world,
-            settings: &self.config.capture,
+            settings: &self.capture,
             distance_clamp_m: clamp.map(|diagonals| diagonals * self.grid.spacing().length()),
             hit_light: self.config.transport.hit_light(),
             keeps_geometric: self.config.query.needs_geometric(),
+            sees: self.config.store.light_field != LightFieldStore::None,
+            resampling: self.resampling.as_ref(),
             seed: circumstances.seed,
         }
     }
@@ -87,7 +98,7 @@ impl Prepared<'_, '_> {
     pub(super) fn occlusion_builder(&self) -> OcclusionBuilder {
         let store = &self.config.store;
         let occlusion = if self.stores_occlusion() { &store.occlusion } else { &OcclusionStore::None };
-        let directions = self.config.capture.rays.directions();
+        let directions = self.capture.rays.directions();
         occlusion.builder(self.placement.survey.as_ref(), &directions, &self.grid, store.border)
     }
 
@@ -98,24 +109,52 @@ impl Prepared<'_, '_> {
 
     /// Traces one active probe.
     pub(super) fn trace(&self, capture: &Capture, probe: usize) -> ProbeCapture {
-        let position = self.contacts.viewpoint(probe, self.placement.positions[probe]);
+        let (capture, stream) = self.at(capture, probe);
+        capture.probe(stream, self.viewpoint(probe), |p| self.contains(p))
+    }
+
+    /// Traces one frame of an active probe.
+    pub(super) fn frame(&self, capture: &Capture, probe: usize, frame: u32) -> ProbeCapture {
+        let (capture, stream) = self.at(capture, probe);
+        capture.frame(stream, self.viewpoint(probe), |p| self.contains(p), frame)
+    }
+
+    /// A probe's own capture, and what numbers its random sequences.
+    fn at<'c>(&self, capture: &Capture<'c, 'c>, probe: usize) -> (Capture<'c, 'c>, usize) {
         let index = ProbeIndex(probe as u32);
         // A probe that stands for a larger cell must know distances as much farther.
         let farther = self.grid.width(index) as f32;
         let capture = Capture { distance_clamp_m: capture.distance_clamp_m.map(|m| m * farther), ..*capture };
-        let (low, high) = self.hull;
-        capture.probe(self.grid.stream(index) as usize, position, |p| p.cmpge(low).all() && p.cmple(high).all())
+        (capture, self.grid.stream(index) as usize)
     }
 
     /// What a probe's occlusion keeps of distances: those of its capture, which lets go of them, or of rays of their own.
     pub(super) fn look(&self, occlusion: &OcclusionBuilder, probe: usize, captured: &mut ProbeCapture) -> Vec<Vec2> {
         let mut distances = std::mem::take(&mut captured.distances);
         if occlusion.has_rays() {
-            let position = self.contacts.viewpoint(probe, self.placement.positions[probe]);
-            distances = convert::distances(self.world, occlusion, probe, position);
+            distances = convert::distances(self.world, occlusion, probe, self.viewpoint(probe));
             captured.rays.primary += distances.len() as u64;
         }
         occlusion.filter(probe, &distances)
+    }
+
+    /// Where a probe's rays start.
+    fn viewpoint(&self, probe: usize) -> Vec3 {
+        self.contacts.viewpoint(probe, self.placement.positions[probe])
+    }
+
+    fn contains(&self, p: Vec3) -> bool {
+        let (low, high) = self.hull;
+        p.cmpge(low).all() && p.cmple(high).all()
+    }
+
+    /// The filter from captures to the volume's irradiance.
+    pub(super) fn kernel(&self, volume: &Volume) -> Kernel {
+        // Frames make filters of their own.
+        match self.config.transport.captures_once() {
+            true => volume.irradiance.kernel(&self.capture.rays.directions()),
+            false => Kernel::of_rows(std::iter::empty()),
+        }
     }
 
     /// The volume before any light is in it.
@@ -126,18 +165,30 @@ impl Prepared<'_, '_> {
             states: self.placement.states.clone(),
             irradiance: store.irradiance.zeros(self.grid.probe_count(), store.border),
             occlusion,
+            radiance: self.radiance_store().zeros(self.grid.probe_count(), self.capture.rays.side().unwrap_or(0)),
+            layout: store.layout.clone(),
             grid: self.grid.clone(),
         }
+    }
+
+    /// What is stored of radiance: the levels for glossy surfaces only where the plan keeps them.
+    fn radiance_store(&self) -> RadianceStore<'_> {
+        let store = self.config.store.radiance();
+        RadianceStore { prefiltered: if self.plan.radiance_levels { store.prefiltered } else { &[] }, ..store }
     }
 
     /// Bytes per probe in the layout that shading uses: in full, and after the plan.
     pub(super) fn runtime_bytes(&self) -> (f64, f64) {
         let (store, probes) = (&self.config.store, self.grid.probe_count());
+        let side = self.capture.rays.side().unwrap_or(0);
+        let (field, levels) = store.radiance().runtime_bytes(side, store.layout.g_buffer);
         let moved = self.config.placement.rule.moves();
-        let head = (head_bytes(moved) + store.irradiance.runtime_bytes(store.border)) as f64;
-        let head = head + self.grid.runtime_bytes(moved);
+        let own = store.layout.head_bytes(moved) + store.irradiance.runtime_bytes(store.border) + field;
+        let always = own as f64 + self.grid.runtime_bytes(moved);
         let survey = self.placement.survey.as_ref();
-        let full = head + store.occlusion.runtime_bytes(store.border, survey, probes);
-        (full, if self.plan.visibility { full } else { head })
+        let occlusion = store.occlusion.runtime_bytes(store.border, survey, probes, &store.layout);
+        let kept_levels = if self.plan.radiance_levels { levels } else { 0 } as f64;
+        let kept = always + kept_levels + if self.plan.visibility { occlusion } else { 0.0 };
+        (always + levels as f64 + occlusion, kept)
     }
 }

@@ -255,8 +255,8 @@ pub struct SweepArgs {
     /// Folder for reference, runs, report, table and plots; created where missing.
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Built-in configuration to compare, may be repeated; `all`: every one. The default where no --preset, --config nor
-    /// base in the ladder is given.
+    /// Built-in configuration to compare, may be repeated; `all`: every method, which leaves out `path`, the truth at the
+    /// probes. The default where no --preset, --config nor base in the ladder is given.
     #[arg(long, value_name = "NAME|all")]
     pub preset: Vec<String>,
     /// Configuration file to compare, may be repeated. With --preset it lies over each of them, as a scene's own does.
@@ -277,11 +277,15 @@ pub struct SweepArgs {
     /// Bakes of every configuration, with the seeds from --seed on. From 2 on, noise is told from bias.
     #[arg(long, value_name = "N", default_value_t = 3, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=MAX_SEEDS))]
     pub seeds: u32,
+    /// Bake every configuration on N grids, shifted by fractions of a cell that --seed chooses, and report geometric means:
+    /// how planes of probes meet walls decides much of the error.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=MAX_SEEDS))]
+    pub offsets: Option<u32>,
     #[command(flatten)]
     pub view: ViewArgs,
 }
 
-/// Most seeds of a sweep: the spread is known well long before.
+/// Most seeds of a sweep, and most offsets: the spread is known well long before.
 const MAX_SEEDS: i64 = 1000;
 
 /// What is held equal between methods.

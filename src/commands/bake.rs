@@ -194,6 +194,7 @@ fn report(baked: &Baked, config: &Config, session: &Session, file_bytes: u64, ra
         bytes_per_probe: BytesPerProbe {
             runtime,
             runtime_kept,
+            published: config.store.layout.published,
             file: file_bytes as f64 / probes as f64,
             tensors: tensors.map(|(n, t)| (n.clone(), t.bytes.len() as f64 / probes as f64)).collect(),
         },
@@ -238,7 +239,8 @@ fn warn_about(report: &BakeReport, config: &Config, console: &Console) {
         console.say(format!("{count} value(s) of tensor '{tensor}' are too small for its format and stored as 0"));
     }
     if !report.converged && !config.transport.is_limited() {
-        console.warn(format!("the bounces did not converge; raise {}", config.transport.patience_keys()));
+        let key = config.transport.limit_key();
+        console.warn(format!("the bounces did not converge; raise {key} or the tolerance beside it"));
     }
     for (tensor, &count) in numerics.clamped.iter().filter(|c| *c.1 > 0) {
         console.warn(format!("{count} value(s) of tensor '{tensor}' are beyond its format's range and clamped"));
@@ -278,6 +280,9 @@ fn summary(report: &BakeReport, config: &Config, output: &Path) -> String {
 /// How many there are, and by how many iterations where these are combined.
 fn bounces(report: &BakeReport, config: &Config) -> String {
     let iterations = report.bounces.len();
+    if let Some(stopped) = report.solver.stopped {
+        return format!("all, by {iterations} iterations: {}", stopped.in_words());
+    }
     match report.solver.accelerated {
         _ if config.transport.is_complete() => "all, by paths".to_owned(),
         0 => report.bounces.last().map_or(0, |bounce| bounce.index).to_string(),

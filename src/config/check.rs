@@ -4,6 +4,7 @@
 use super::ron_text::ConfigError;
 use super::settings::{Config, STAGES};
 use crate::probe::lattice::grid::Bounds;
+use crate::probe::store::radiance::LightFieldStore;
 use crate::scene::Unassigned;
 use crate::scene::light::LIGHT_MAX;
 
@@ -22,6 +23,42 @@ const MIN_SPACING_M: f64 = 1e-12;
 const UNIT_RULE: &str = "use a number from 0 to 1";
 
 impl Config {
+    /// What of two stages does not go together, with the remedy, and the sections that say it; `None` where all does.
+    pub(super) fn mismatch(&self) -> Option<(&'static [&'static str], String)> {
+        let Config { capture, placement, transport, store, query, .. } = self;
+        if let Some(what) = query.mismatch(&store.occlusion) {
+            return Some((&["store", "query"], what));
+        }
+        if let Some(what) = store.radiance().mismatch(capture.rays.side()) {
+            return Some((&["store", "capture"], what));
+        }
+        let both: &[&str] = &["transport", "capture", "store"];
+        if transport.needs_gathered_emission() && !capture.gathers_emission() {
+            return Some((both, "transport is frames: capture.emission must be gathered".to_owned()));
+        }
+        if transport.mixes_samples() && !store.irradiance.is_irradiance() {
+            return Some((both, "transport is frames: store.irradiance must be octahedral".to_owned()));
+        }
+        if transport.needs_light_field() && store.light_field == LightFieldStore::None {
+            return Some((both, "transport is tracing: store.light_field must be maps".to_owned()));
+        }
+        if !transport.captures_once() && !store.radiance().is_empty() {
+            let what = "transport is frames: store.light_field must be none and store.prefiltered empty";
+            return Some((both, what.to_owned()));
+        }
+        if capture.backs.are_left_out() && !transport.may_leave_out() {
+            let what = "capture.backs.radiance leave_out is for transport frames; use reflect with others";
+            return Some((both, what.to_owned()));
+        }
+        let (rays, reserved) = (capture.rays.count(), placement.rule.reserved_rays());
+        if capture.rays.lends_rays() && rays <= reserved {
+            let what =
+                format!("capture.rays.fibonacci.count is {rays}: placement.rule keeps {reserved} of them; use more");
+            return Some((&["capture", "placement"], what));
+        }
+        None
+    }
+
     /// Refuses what no stage could work with.
     pub(super) fn check(&self, place: &str) -> Result<(), ConfigError> {
         let mut first_error = Ok(());

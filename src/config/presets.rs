@@ -21,6 +21,21 @@ pub const PRESETS: &[Preset] = &[
         text: include_str!("../../configs/presets/path.ron"),
     },
     Preset {
+        name: "ddgi-2019",
+        summary: "dynamic diffuse global illumination, run until it has settled (Majercik et al. 2019, 2021)",
+        text: include_str!("../../configs/presets/ddgi-2019.ron"),
+    },
+    Preset {
+        name: "irradiance-2022",
+        summary: "irradiance probes from cube maps, one bounce, no visibility (Luo 2022)",
+        text: include_str!("../../configs/presets/irradiance-2022.ron"),
+    },
+    Preset {
+        name: "lightfield-2022",
+        summary: "light-field probes from cube maps, traced bounces, moments of distance (Luo 2022)",
+        text: include_str!("../../configs/presets/lightfield-2022.ron"),
+    },
+    Preset {
         name: "threev8-uniform",
         summary: "Three.V8 (Fei Yang 2023): spherical harmonics, tiles of distance",
         text: include_str!("../../configs/presets/threev8-uniform.ron"),
@@ -31,6 +46,14 @@ pub const PRESETS: &[Preset] = &[
         text: include_str!("../../configs/presets/threev8-mixed.ron"),
     },
 ];
+
+/// The preset that is no method but what methods are compared with: the truth at the probes.
+const TRUTH: &str = "path";
+
+/// What `all` stands for.
+pub fn methods() -> impl Iterator<Item = &'static Preset> {
+    PRESETS.iter().filter(|preset| preset.name != TRUTH)
+}
 
 /// The preset of a name.
 ///

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use glam::{UVec3, Vec3};
 
-use super::emitters::shares::Shares;
+use super::learnt::Learnt;
 use super::surface::SurfacePoint;
 use crate::scene::Scene;
 
@@ -21,7 +21,7 @@ pub struct Places {
     pub cell: Vec3,
     cells: UVec3,
     /// Six per cell, one per main direction.
-    shares: Vec<OnceLock<Box<Shares>>>,
+    learnt: Vec<OnceLock<Box<Learnt>>>,
 }
 
 impl Places {
@@ -34,7 +34,7 @@ impl Places {
         let side = (volume / CELLS).cbrt() as f32;
         let cells = (size / side).ceil().max(Vec3::ONE).as_uvec3().min(UVec3::splat(CELLS as u32));
         let count = cells.to_array().iter().map(|&n| n as usize).product::<usize>();
-        Places { low, cell: size / cells.as_vec3(), cells, shares: (0..6 * count).map(|_| OnceLock::new()).collect() }
+        Places { low, cell: size / cells.as_vec3(), cells, learnt: (0..6 * count).map(|_| OnceLock::new()).collect() }
     }
 
     /// The cell that holds a position, and the main direction of a normal.
@@ -55,8 +55,13 @@ impl Places {
     }
 
     /// What a place has learnt so far.
-    pub fn shares(&self, key: usize) -> &OnceLock<Box<Shares>> {
-        &self.shares[key]
+    pub fn learnt(&self, key: usize) -> &OnceLock<Box<Learnt>> {
+        &self.learnt[key]
+    }
+
+    /// Number of keys.
+    pub fn keys(&self) -> usize {
+        self.learnt.len()
     }
 
     /// Corner of the cell of a key, and its main direction, unit.

@@ -13,7 +13,7 @@ use super::emitters::{LightSample, Origin};
 use super::surface::SurfacePoint;
 use crate::math::random::{KroneckerSequence, Random};
 use crate::math::sampling::{cosine_hemisphere, cosine_hemisphere_density};
-use crate::trace::Ray;
+use crate::trace::{Hit, Ray};
 
 /// Numbers of rays traced.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -113,20 +113,25 @@ impl World<'_> {
     /// What the ray's first hit, or the sky, emits towards the ray's origin. `None` where that is nothing. The ray's direction
     /// has unit length.
     pub fn emission_along(&self, receiver: &Receiver, ray: Ray) -> Option<Emission> {
-        let sky = || {
-            let (radiance, group, density) = self.emitters.sky_group_along(self.scene, ray.direction)?;
-            (radiance != Vec3::ZERO).then_some(Emission { radiance, group, density })
-        };
         if self.emitters.triangle_count() == 0 {
             // No surface emits, so any hit means no light.
-            return if self.tracer.occluded(ray) { None } else { sky() };
+            return if self.tracer.occluded(ray) { None } else { self.emission_of(receiver, ray.direction, None) };
         }
-        let Some(hit) = self.tracer.closest(ray) else { return sky() };
-        let radiance = self.emission_towards(&hit, ray.direction);
+        self.emission_of(receiver, ray.direction, self.tracer.closest(ray))
+    }
+
+    /// What the first hit of a ray, or the sky, emits towards the receiver. `None` where that is nothing.
+    #[inline]
+    pub fn emission_of(&self, receiver: &Receiver, direction: Vec3, hit: Option<Hit>) -> Option<Emission> {
+        let Some(hit) = hit else {
+            let (radiance, group, density) = self.emitters.sky_group_along(self.scene, direction)?;
+            return (radiance != Vec3::ZERO).then_some(Emission { radiance, group, density });
+        };
+        let radiance = self.emission_towards(&hit, direction);
         if radiance == Vec3::ZERO {
             return None;
         }
-        let (group, density) = self.emitters.group_of_hit(receiver, ray.direction, &hit)?;
+        let (group, density) = self.emitters.group_of_hit(receiver, direction, &hit)?;
         Some(Emission { radiance, group, density })
     }
 }

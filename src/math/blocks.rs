@@ -28,6 +28,11 @@ const BITS: u32 = BLOCK.ilog2();
 /// Random bits that scrambling one coordinate takes.
 const TREE_BITS: u32 = BLOCK - 1;
 
+/// Pairs of dimensions from here on are independent random numbers. Paths that read them come from different places by
+/// then, so that stratifying them does not pay; with 16, which is two bounces earlier, `reference` in one closed room had
+/// 1.25 × the variance.
+const STRATIFIED_PAIRS: u32 = 32;
+
 /// Odd factors that distribute small counters over 64 bits: the fractional parts of the golden ratio and of √2, × 2⁶⁴.
 const PAIR_STEP: u64 = 0x9E37_79B9_7F4A_7C15;
 const INDEX_STEP: u64 = 0x6A09_E667_F3BC_C909;
@@ -84,6 +89,9 @@ impl BlockSample {
         let scramble = mix(self.key ^ u64::from(self.pair + 1).wrapping_mul(PAIR_STEP));
         let below = mix(scramble ^ u64::from(self.index + 1).wrapping_mul(INDEX_STEP));
         self.pair += 1;
+        if self.pair > STRATIFIED_PAIRS {
+            return [below as u32, (below >> 32) as u32];
+        }
         let index = scrambled(self.index, scramble as u32);
         let x = scrambled(van_der_corput(index), (scramble >> TREE_BITS) as u32);
         let y = scrambled(sobol(index), (scramble >> (2 * TREE_BITS)) as u32);

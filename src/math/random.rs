@@ -22,8 +22,18 @@ pub enum Purpose {
     ProbePaths = 6,
     /// Rays by which places learn which emitters they see.
     Places = 7,
+    /// Rotations of the rays of frames.
+    FrameRotation = 8,
+    /// Rays from captured hits that find the next surface.
+    HitRays = 9,
     /// Noise added to a reference, to measure how the reference's own noise changes FLIP.
     FlipReplicate = 16,
+    /// Points of free air, and their normals.
+    Air = 17,
+    /// Paths from points of free air.
+    AirPaths = 18,
+    /// Shifts of grids against the scene.
+    Offsets = 19,
 }
 
 /// A source of numbers for random decisions: a [`Random`] stream, or a point of an evenly distributed set

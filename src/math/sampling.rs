@@ -23,14 +23,13 @@ pub fn concentric_disc(u: Vec2) -> Vec2 {
     if p == Vec2::ZERO {
         return Vec2::ZERO;
     }
-    if p.x.abs() > p.y.abs() {
-        let (sin, cos) = sin_cos_octant(PI / 4.0 * (p.y / p.x));
-        p.x * Vec2::new(cos, sin)
-    } else {
-        // The angle counts from the other axis here, so sine and cosine change places.
-        let (sin, cos) = sin_cos_octant(PI / 4.0 * (p.x / p.y));
-        p.y * Vec2::new(sin, cos)
-    }
+    // Selections instead of branches, which would be taken at random.
+    let swapped = p.y.abs() >= p.x.abs();
+    let (major, minor) = if swapped { (p.y, p.x) } else { (p.x, p.y) };
+    let (sin, cos) = sin_cos_octant(PI / 4.0 * (minor / major));
+    // The angle counts from the axis of the larger coordinate.
+    let (along, across) = (major * cos, major * sin);
+    if swapped { Vec2::new(across, along) } else { Vec2::new(along, across) }
 }
 
 /// Sine and cosine of |x| ≤ π/4 by their Taylor series. The first omitted terms are at most 3·10⁻⁷ and 3·10⁻⁸. This

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::header::Header;
 use crate::bake::figures::{Numerics, Rays, Times};
 use crate::plan::Line;
-use crate::probe::transport::solver::{Bounce, Solution};
+use crate::probe::transport::solver::{Bounce, Solution, Stopped};
 
 /// Version of the report's layout.
 pub const SCHEMA: &str = "lightprobe-bake/1";
@@ -41,6 +41,8 @@ pub struct BytesPerProbe {
     pub runtime: f64,
     /// The same after the plan.
     pub runtime_kept: f64,
+    /// What the method's source says instead, where it differs from what its own formats give and no one knows why.
+    pub published: Option<u64>,
     /// File size ÷ probes.
     pub file: f64,
     /// Tensor size ÷ probes.
@@ -64,6 +66,8 @@ pub struct SolverReport {
     pub plain_fallbacks: u64,
     /// Texels of sweeps that went on plainly because a combination was negative there.
     pub negative_texels: u64,
+    /// Why frames or traced iterations ended: settled, or limit.
+    pub stopped: Option<Stopped>,
 }
 
 impl SolverReport {
@@ -76,6 +80,7 @@ impl SolverReport {
             error_bound_relative: solution.error_bound_relative,
             plain_fallbacks: solution.plain_fallbacks,
             negative_texels: solution.negative_texels,
+            stopped: solution.stopped,
         }
     }
 }

@@ -25,6 +25,10 @@ pub struct Leak {
     pub fraction: Option<f64>,
     /// Mean share of the weights that hidden probes have. `null` without points.
     pub weight: Option<f64>,
+    /// Share of the points with |E − Ê| > ¼·max(Ê, mean(Ê)/100): blotches that everyone sees, however little light they
+    /// hold. `null` without points.
+    #[serde(default)]
+    pub blocks: Option<f64>,
     /// Share of the image's points that see none of their probes.
     pub unseen: f64,
     /// Mean irradiance where the reference is dark, as a share of the reference's mean; see [`dark_region`]. `null`
@@ -34,6 +38,11 @@ pub struct Leak {
     /// ([`super::baked`]). `null` without a traced reference.
     pub baked: Option<f64>,
 }
+
+/// A point counts to `blocks` if its difference exceeds this share of its light, and of this share of the mean light where
+/// it has less.
+const BLOCK_SHARE: f64 = 0.25;
+const BLOCK_FLOOR: f64 = 0.01;
 
 /// A pixel is dark if its irradiance is below this share of the reference's mean over the picture.
 const DARK_SHARE: f64 = 1.0e-3;
@@ -108,6 +117,8 @@ pub fn measure(
     let (mut light, mut dark, mut total) = (0.0f64, 0.0f64, 0.0f64);
     let (mut from_hidden, mut from_all) = (0.0f64, 0.0f64);
     let (mut hidden_weight, mut seen, mut unseen) = (0.0f64, 0.0f64, 0.0f64);
+    // Of points that see a probe: share, |E − Ê|, Ê.
+    let mut differences = Vec::with_capacity(points.len());
     for (i, point) in points.iter().enumerate() {
         let share = f64::from(point.weight);
         if query.weights(&point.query, VisibilityMode::Ray.visibility(masks[i])).total() <= 0.0 {
@@ -119,6 +130,7 @@ pub fn measure(
         light += (e - e_exact).max(0.0) * share;
         dark += (e_exact - e).max(0.0) * share;
         total += e_exact * share;
+        differences.push((share, (e - e_exact).abs(), e_exact));
 
         let corners = query.weights(&point.query, mode.visibility(masks[i]));
         let sum = f64::from(corners.total());
@@ -134,11 +146,15 @@ pub fn measure(
         }
     }
     let ratio = |a: f64, b: f64| (b > 0.0).then(|| a / b);
+    let least = BLOCK_FLOOR * ratio(total, seen).unwrap_or(0.0);
+    let is_block = |(_, difference, exact): &&(f64, f64, f64)| *difference > BLOCK_SHARE * exact.max(least);
+    let blocks = differences.iter().filter(is_block).fold(0.0, |sum, (share, ..)| sum + share);
     Leak {
         light: ratio(light, total),
         dark: ratio(dark, total),
         fraction: ratio(from_hidden, from_all),
         weight: ratio(hidden_weight, seen),
+        blocks: ratio(blocks, seen),
         unseen: ratio(unseen, seen + unseen).unwrap_or(0.0),
         ..Leak::default()
     }

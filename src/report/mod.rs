@@ -1,5 +1,6 @@
 //! Figures and pictures for people and machines: reports, tables, false-colour pictures, text in pictures.
 
+pub mod air;
 pub mod bake;
 pub mod baked;
 pub mod colormap;
@@ -17,6 +18,7 @@ pub mod probe_key;
 pub mod reference;
 pub mod reference_layers;
 pub mod render;
+pub mod sheet;
 pub mod sweep;
 pub mod table;
 pub mod ticks;

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::air::AirFigures;
 use super::baked::BakedReport;
 use super::error::ErrorReport;
 use super::header::Header;
@@ -77,6 +78,11 @@ pub struct MethodReport {
     /// Mean over the pixels that show a surface, luminance, W·m⁻².
     pub irradiance_indirect_mean: Option<f64>,
     pub leak: Leak,
+    /// Share of the image's points that lie outside the probes' hull. They use the cells at its rim. `null` without
+    /// points.
+    pub outside_hull: Option<f64>,
+    /// At random points of free air.
+    pub air: AirFigures,
     /// Against a reference of diffuse transport, as probes have it; `null` without one.
     pub error: Option<ErrorReport>,
     /// Against a reference with glossy transport, which probes do not have; absent without one.

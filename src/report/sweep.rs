@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::air::AirFigures;
 use super::baked::BakedFigures;
 use super::error::Figures;
 use super::header::Header;
@@ -31,6 +32,8 @@ pub struct SweepReport {
     pub points: usize,
     pub exposure_ev: f32,
     pub seeds: Vec<u64>,
+    /// Shifts of the grids along x, y and z, cells; empty where they stay.
+    pub offsets: Vec<[f64; 3]>,
     pub error_figure: &'static str,
     pub reference: ReferenceSummary,
     pub time_s: SweepTimes,
@@ -104,14 +107,16 @@ pub struct AxisValue {
     pub value: String,
 }
 
-/// A figure over the seeds; all `null` where it is undefined with any of them.
+/// A figure over the seeds, and over the offsets where there are any; all `null` where it is undefined with any of them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Aggregate {
     pub mean: Option<f64>,
     pub min: Option<f64>,
     pub max: Option<f64>,
-    /// Of the mean, from the spread between the seeds; `null` with one.
+    /// Of the mean, from the spread between the runs; `null` with one.
     pub standard_error: Option<f64>,
+    /// Over shifted grids; `null` without such, and where the figure is not positive on all of them.
+    pub geometric_mean: Option<f64>,
 }
 
 impl Aggregate {
@@ -124,7 +129,20 @@ impl Aggregate {
             min: values.iter().copied().reduce(f64::min),
             max: values.iter().copied().reduce(f64::max),
             standard_error: (values.len() > 1).then(|| (moments.variance() / (moments.weight() - 1.0)).sqrt()),
+            geometric_mean: None,
         }
+    }
+
+    /// The same with the geometric mean, of runs on several grids.
+    pub fn over_grids(values: &[Option<f64>]) -> Aggregate {
+        let logarithms: Option<Moments> = values.iter().map(|v| v.filter(|v| *v > 0.0).map(f64::ln)).collect();
+        let all = Aggregate::of(values);
+        Aggregate { geometric_mean: all.mean.and(logarithms).map(|moments| moments.mean().exp()), ..all }
+    }
+
+    /// What stands for the figure in tables, plots and fronts: the geometric mean where there is one.
+    pub fn typical(&self) -> Option<f64> {
+        self.geometric_mean.or(self.mean)
     }
 }
 
@@ -132,6 +150,9 @@ impl Aggregate {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunRecord {
     pub seed: u64,
+    /// Shift of the grid along x, y and z, cells; `null` where it stays.
+    #[serde(default)]
+    pub offset: Option<[f64; 3]>,
     pub probes: usize,
     pub probes_active: usize,
     /// Of positions and states.
@@ -181,8 +202,13 @@ pub struct MethodFigures {
     pub lookup_ns: Option<f64>,
     pub irradiance_indirect_mean: Option<f64>,
     pub leak: Leak,
-    /// `error.rmse` ÷ the reference's mean; `null` where that is 0.
+    pub outside_hull: Option<f64>,
+    pub air: AirFigures,
+    /// `error.nrmse`.
     pub error_relative: Option<f64>,
+    /// `error.by_region.corner.nrmse`, `error.by_region.flat.nrmse`.
+    pub error_corner: Option<f64>,
+    pub error_flat: Option<f64>,
     pub error: Figures,
     /// From the reference's noise.
     pub standard_error: Figures,
@@ -293,6 +319,12 @@ mod tests {
         // Σ(x − 3)² = 14; ÷ (3·2), root.
         assert!((all.standard_error.unwrap() - (14.0f64 / 6.0).sqrt()).abs() < 1e-12);
         assert_eq!(Aggregate::of(&[Some(1.0)]).standard_error, None);
+        assert_eq!(all.typical(), Some(3.0));
+        let grids = Aggregate::over_grids(&[Some(1.0), Some(2.0), Some(4.0)]);
+        assert!((grids.typical().unwrap() - 2.0).abs() < 1e-12 && (grids.mean.unwrap() - 7.0 / 3.0).abs() < 1e-12);
+        // A leak of 0 on one grid has no logarithm.
+        assert_eq!(Aggregate::over_grids(&[Some(0.0), Some(2.0)]).typical(), Some(1.0));
+        assert_eq!(Aggregate::over_grids(&[None, Some(2.0)]), Aggregate::default());
         for odd in [&[][..], &[Some(1.0), None], &[Some(f64::NAN)]] {
             assert_eq!(Aggregate::of(odd), Aggregate::default());
         }

@@ -21,6 +21,14 @@ pub fn to_pixels(view: &View, value: impl Fn(usize, &ImagePoint) -> Vec3) -> Vec
     pixels
 }
 
+/// The beauty of a picture by its layers without indirect light, and the indirect irradiance of each pixel, W·m⁻²; radiance,
+/// W·m⁻²·sr⁻¹. Where translucent surfaces overlap, the pixel's mean albedo stands for that of each.
+pub fn lit(dark: &LayeredImage, irradiance: &[Vec3]) -> Vec<Vec3> {
+    let layer = |name: &str| dark.layer(name).unwrap_or_default();
+    let pixels = layer("beauty").iter().zip(layer("albedo")).zip(irradiance);
+    pixels.map(|((beauty, albedo), irradiance)| *beauty + reflected_radiance(*albedo, *irradiance)).collect()
+}
+
 /// All layers of a picture. `indirect` is the indirect irradiance at every point, W·m⁻².
 pub fn compose(view: &View, indirect: &[Vec3]) -> LayeredImage {
     let mut image = LayeredImage::new(view.width, view.height);

@@ -1,5 +1,6 @@
 //! From cameras to pictures: which points a camera sees, how probes or paths light them, and the layers of the result.
 
+pub mod air;
 mod develop;
 pub mod film;
 pub mod framing;

@@ -18,6 +18,7 @@ use super::points::{ImagePoint, has_blend, see, see_pixel};
 use crate::image::LayeredImage;
 use crate::light::World;
 use crate::light::bsdf::ReflectionModel;
+use crate::light::expected::Expected;
 use crate::light::path::{PathSettings, Strategy};
 use crate::light::sampled::RayCount;
 use crate::math::blocks::{BLOCK, Block};
@@ -58,8 +59,9 @@ impl Default for ReferenceSettings {
 }
 
 impl ReferenceSettings {
-    pub fn path(&self) -> PathSettings {
+    fn path<'e>(&self, expected: &'e Expected) -> PathSettings<'e> {
         PathSettings {
+            expected: Some(expected),
             transport: self.transport,
             strategy: self.strategy,
             max_bounces: self.max_bounces,
@@ -172,6 +174,7 @@ pub struct Tracing<'a> {
     width: u32,
     height: u32,
     settings: ReferenceSettings,
+    expected: Expected,
     /// The points of the pixels. `None` if they change from block to block.
     view: Option<FixedView>,
     state: State,
@@ -190,8 +193,9 @@ impl<'a> Tracing<'a> {
         previous: Option<State>,
     ) -> Tracing<'a> {
         let pixels = width as usize * height as usize;
+        let view = see(world, camera, width, height, settings.seed);
+        let expected = world.expect(view.points.iter().map(|p| world.places.key_of(&p.surface)).collect());
         let view = (!has_blend(world)).then(|| {
-            let view = see(world, camera, width, height, settings.seed);
             let mut point_of_pixel = vec![NO_POINT; pixels];
             view.points.iter().enumerate().for_each(|(i, p)| point_of_pixel[p.pixel as usize] = i as u32);
             let direct = |p: &ImagePoint| direct_radiance(world, p, settings.transport, p.pixel);
@@ -203,7 +207,7 @@ impl<'a> Tracing<'a> {
             non_finite: 0,
             rays: RayCount::default(),
         });
-        Tracing { world, camera, width, height, settings: *settings, view, state, part_done: false }
+        Tracing { world, camera, width, height, settings: *settings, expected, view, state, part_done: false }
     }
 
     /// Number of passes left.
@@ -287,7 +291,7 @@ impl<'a> Tracing<'a> {
         means: &mut [DVec3; MOST],
         counts: &mut Counts,
     ) {
-        let path = self.settings.path();
+        let path = self.settings.path(&self.expected);
         let block = Block::new(self.settings.seed, Purpose::Path, u64::from(pixel), u64::from(block));
         let mut index = 0;
         for point in points {

@@ -21,7 +21,7 @@ pub fn share_positions(ladders: &mut [Ladder]) {
 }
 
 fn mean(configuration: &ConfigurationReport, figure: &str) -> Option<f64> {
-    configuration.figures.get(figure)?.mean
+    configuration.figures.get(figure)?.typical()
 }
 
 /// Configurations with the same values of the axes beside each other.

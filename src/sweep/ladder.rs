@@ -20,45 +20,12 @@ use ron::value::RawValue;
 use serde::Deserialize;
 
 use super::SweepError;
+use super::method::Method;
 use crate::config::{Config, ConfigError, Layers};
 use crate::system::input::read_file;
 
 /// Configurations of a sweep at most: more is a mistake in an axis.
 const MOST: usize = 4096;
-
-/// What ladders start from.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Method {
-    pub name: String,
-    pub layers: Layers,
-}
-
-impl Method {
-    /// A preset, and files over it; without a preset over the defaults. Both name it.
-    ///
-    /// # Errors
-    /// There is no such preset; a file cannot be read.
-    pub fn new(preset: Option<&str>, files: &[PathBuf]) -> Result<Method, ConfigError> {
-        let mut layers = Layers::default();
-        let mut names = Vec::new();
-        if let Some(name) = preset {
-            layers = layers.preset(name)?;
-            names.push(name.to_owned());
-        }
-        for path in files {
-            layers = layers.file(path)?;
-            let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
-            names.push(stem.unwrap_or_else(|| path.display().to_string()));
-        }
-        // What is held alike by all is no part of a method's name.
-        let name = match preset {
-            Some(preset) => preset.to_owned(),
-            None if names.is_empty() => "default".to_owned(),
-            None => names.join(", "),
-        };
-        Ok(Method { name, layers })
-    }
-}
 
 /// One configuration of a ladder.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,6 +34,18 @@ pub struct Rung {
     /// Keys and values in which it differs from the others of its ladder.
     pub axes: Vec<(String, String)>,
     pub config: Config,
+    /// The same on shifted grids, each with its shift in cells; none where the grid stays. See [`super::offsets`].
+    pub shifted: Vec<([f64; 3], Config)>,
+}
+
+impl Rung {
+    /// All that is baked, with the shift of its grid.
+    pub fn configs(&self) -> Vec<(Option<[f64; 3]>, &Config)> {
+        match &self.shifted[..] {
+            [] => vec![(None, &self.config)],
+            shifted => shifted.iter().map(|(shift, config)| (Some(*shift), config)).collect(),
+        }
+    }
 }
 
 /// One curve.
@@ -183,7 +162,7 @@ pub fn expand(
         for method in methods {
             let mut config = method.layers.clone().set(set)?.config()?;
             finish(&mut config);
-            let rung = Rung { label: method.name.clone(), axes: Vec::new(), config };
+            let rung = Rung { label: method.label(&config), axes: Vec::new(), config, shifted: Vec::new() };
             ladders.push(Ladder { name: method.name.clone(), method: method.name.clone(), rungs: vec![rung] });
         }
         return Ok(ladders);
@@ -241,7 +220,7 @@ fn rungs(name: &str, base: &Layers, axes: &[Axis], finish: &dyn Fn(&mut Config))
         finish(&mut config);
         let parts: Vec<String> = axes.iter().map(|(key, value)| format!("{}={value}", short(key, &axes))).collect();
         let label = if parts.is_empty() { name.to_owned() } else { format!("{name} {}", parts.join(" ")) };
-        Ok(Rung { label, axes, config })
+        Ok(Rung { label, axes, config, shifted: Vec::new() })
     };
     found.into_iter().map(rung).collect()
 }
@@ -322,7 +301,8 @@ mod tests {
 
     #[test]
     fn a_method_each_where_there_are_several() {
-        let methods = ["one", "two"].map(|name| Method { name: name.to_owned(), layers: Layers::default() });
+        let methods = ["one", "two"];
+        let methods = methods.map(|name| Method { name: name.to_owned(), layers: Layers::default(), preset: None });
         let file = "(ladders: [(name: \"a\", axes: [(key: \"grid.spacing_m\", values: [1, 2])])])";
         let file = LadderFile::parse(file, Path::new("a.ron")).unwrap();
         let ladders = expand(Some(&file), &methods, &[], |_| {}).unwrap();

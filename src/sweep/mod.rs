@@ -1,6 +1,6 @@
 //! Many bakes of one scene against one reference: which configuration errs how much, at what time, bytes and leak.
 //!
-//! [`ladder`] says which configurations there are, [`run`] bakes and evaluates one of them, [`store`] keeps what is finished,
+//! [`method`] and [`ladder`] say which configurations there are, [`offsets`] shifts their grids, [`run`] bakes and evaluates one of them, [`store`] keeps what is finished,
 //! [`split`] tells noise from bias, [`front`] finds what nothing beats, [`floor`] what limits the best, [`equal`] compares methods at
 //! equal cost.
 
@@ -8,6 +8,8 @@ pub mod equal;
 pub mod floor;
 pub mod front;
 pub mod ladder;
+pub mod method;
+pub mod offsets;
 pub mod run;
 pub mod split;
 pub mod store;

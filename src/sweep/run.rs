@@ -1,17 +1,23 @@
 //! One bake of a sweep, and what it is worth.
 
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use super::SweepError;
 use super::store::{Key, Store, Stored};
 use crate::bake::{Baked, Circumstances, prepare};
 use crate::config::Config;
-use crate::evaluate::{BakedTruth, Comparison, Scenery, Shaded};
+use crate::evaluate::{BakedTruth, Comparison, Scenery, Seen, Shaded};
 use crate::image::Picture;
 use crate::probe::Volume;
 use crate::probe::file::{self, ProbeFile, SceneRecord};
-use crate::probe::query::Query;
+use crate::probe::query::{Query, QueryPoint};
+use crate::report::error::{ByRegion, ErrorEstimate};
 use crate::report::sweep::{BakeTimes, MethodFigures, RunRecord, TruthRecord};
+use crate::shade::air::{self, Air, AirTruth};
 use crate::shade::reference::ReferenceSettings;
 use crate::shade::visibility_modes::VisibilityMode;
 use crate::system::progress::Progress;
@@ -24,9 +30,17 @@ pub struct Setting<'a, 's> {
     pub reference_mean: Option<f64>,
     pub reference_settings: ReferenceSettings,
     pub store: Store,
+    pub truths: Truths,
     /// All that runs depend on besides configuration and seed, as text.
     pub identity: String,
 }
+
+/// Points of the air, and the light there.
+type KnownAir = (Arc<Vec<QueryPoint>>, Arc<AirTruth>);
+
+/// What was traced in the air already, by the bits of the corners of the points' box.
+#[derive(Debug, Default)]
+pub struct Truths(RefCell<HashMap<[[u32; 3]; 2], KnownAir>>);
 
 /// A finished run, new or from the store.
 #[derive(Debug, Clone)]
@@ -92,9 +106,12 @@ impl Setting<'_, '_> {
         let file_query = Query { volume: &bake.volume, settings: &config.query };
         let (masks, masks_s) = self.scenery.masks(&file_query);
         let query = Query { volume: &truth.truth.volume, settings: &config.query };
-        let [_, mut on, mut ray] = self.scenery.shade(&query, &masks, masks_s, bake.bytes_per_probe, || {});
+        let (air, in_air) = self.in_air(&file_query);
+        let seen = Seen { masks: &masks, masks_s, air: &air };
+        let [_, mut on, mut ray] = self.scenery.shade(&query, seen, bake.bytes_per_probe, || {});
         let figures = |shaded: &mut Shaded| {
             shaded.compare(&self.comparison);
+            shaded.compare_in_air(&in_air);
             self.figures(shaded)
         };
         let record = TruthRecord {
@@ -126,9 +143,30 @@ impl Setting<'_, '_> {
     fn shade(&self, config: &Config, bake: &Bake) -> [Shaded; 3] {
         let query = Query { volume: &bake.volume, settings: &config.query };
         let (masks, masks_s) = self.scenery.masks(&query);
-        let mut shaded = self.scenery.shade(&query, &masks, masks_s, bake.bytes_per_probe, || {});
-        shaded.iter_mut().for_each(|s| s.compare(&self.comparison));
+        let (air, in_air) = self.in_air(&query);
+        let seen = Seen { masks: &masks, masks_s, air: &air };
+        let mut shaded = self.scenery.shade(&query, seen, bake.bytes_per_probe, || {});
+        for s in &mut shaded {
+            s.compare(&self.comparison);
+            s.compare_in_air(&in_air);
+        }
         shaded
+    }
+
+    /// Points of the air, and the truth there. Configurations that cover the same share both.
+    fn in_air(&self, query: &Query) -> (Air, Arc<AirTruth>) {
+        let world = self.scenery.world;
+        let (low, high) = air::bounds(world, query.volume);
+        let key = [low, high].map(|corner| corner.to_array().map(f32::to_bits));
+        let mut known = self.truths.0.borrow_mut();
+        if let Some((points, truth)) = known.get(&key) {
+            return (Air::of(world, query, Arc::clone(points)), Arc::clone(truth));
+        }
+        let air = self.scenery.air(query);
+        let ReferenceSettings { spp, seed, .. } = self.reference_settings;
+        let truth = Arc::new(air.truth(world, spp, seed));
+        known.insert(key, (Arc::clone(&air.points), Arc::clone(&truth)));
+        (air, truth)
     }
 
     fn record(&self, seed: u64, bake: &Bake, shaded: &[Shaded; 3]) -> RunRecord {
@@ -143,6 +181,7 @@ impl Setting<'_, '_> {
         let probes = volume.states.len();
         RunRecord {
             seed,
+            offset: None,
             probes,
             probes_active: volume.active_count(),
             probes_blake3: positions_hash(volume),
@@ -161,15 +200,19 @@ impl Setting<'_, '_> {
     fn figures(&self, shaded: &Shaded) -> MethodFigures {
         let report = &shaded.report;
         let measured = report.error.as_ref().map(|error| &error.all);
+        let region = |of: fn(&ByRegion) -> &ErrorEstimate| of(&report.error.as_ref()?.by_region).figures.nrmse;
         let error = measured.map(|m| m.figures).unwrap_or_default();
-        let relative = |value: Option<f64>| Some(value? / self.reference_mean?);
         MethodFigures {
             name: report.name.to_owned(),
             shade_ms: report.shade_ms.median,
             lookup_ns: report.lookup_ns,
             irradiance_indirect_mean: report.irradiance_indirect_mean,
             leak: report.leak,
-            error_relative: relative(error.rmse),
+            outside_hull: report.outside_hull,
+            air: report.air,
+            error_relative: error.nrmse,
+            error_corner: region(|regions| &regions.corner),
+            error_flat: region(|regions| &regions.flat),
             error,
             standard_error: measured.map(|m| m.standard_error).unwrap_or_default(),
             verdict: measured.and_then(|m| m.verdict).map(str::to_owned),

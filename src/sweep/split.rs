@@ -33,6 +33,16 @@ pub struct Split {
 }
 
 impl Split {
+    /// Of several grids: roots of the mean squares.
+    pub fn pooled(splits: &[Split]) -> Split {
+        let root = |of: fn(&Split) -> Option<f64>| {
+            let squares: Option<Vec<f64>> = splits.iter().map(|split| of(split).map(|x| x * x)).collect();
+            let squares = squares.filter(|squares| !squares.is_empty())?;
+            Some((squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+        };
+        Split { noise_rms: root(|split| split.noise_rms), bias_rms: root(|split| split.bias_rms) }
+    }
+
     /// Which of the two is larger.
     pub fn ruled_by(&self) -> Option<&'static str> {
         let (noise, bias) = (self.noise_rms?, self.bias_rms?);
@@ -104,6 +114,15 @@ mod tests {
             beauty: Picture::new(PIXELS as u32, 1),
             beauty_variance: None,
         }
+    }
+
+    #[test]
+    fn several_grids_are_pooled_in_squares() {
+        let split = |noise, bias| Split { noise_rms: Some(noise), bias_rms: Some(bias) };
+        assert_eq!(Split::pooled(&[split(3.0, 1.0)]), split(3.0, 1.0));
+        assert_eq!(Split::pooled(&[split(1.0, 0.0), split(7.0, 0.0)]), split(5.0, 0.0));
+        assert_eq!(Split::pooled(&[split(1.0, 0.0), Split::default()]), Split::default());
+        assert_eq!(Split::pooled(&[]), Split::default());
     }
 
     const REGIONS: [Option<Region>; PIXELS] = [Some(Region::Flat); PIXELS];

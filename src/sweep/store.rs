@@ -18,7 +18,7 @@ use crate::system::input::read_file;
 use crate::system::output::{create_folder, write_atomically};
 
 /// Version of what a run computes; raised whenever the same inputs give other results. The program's own version counts besides.
-const RESULTS: &str = concat!("lightprobe-sweep-run/1, ", env!("CARGO_PKG_VERSION"));
+const RESULTS: &str = concat!("lightprobe-sweep-run/2, ", env!("CARGO_PKG_VERSION"));
 
 /// Folder of runs in a sweep's folder.
 const FOLDER: &str = "runs";

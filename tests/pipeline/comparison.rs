@@ -53,7 +53,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
 }
 
-const FIGURES: [&str; 8] = ["mae", "rmse", "relmse", "bias", "over", "under", "psnr_db", "flip"];
+const FIGURES: [&str; 9] = ["mae", "rmse", "nrmse", "relmse", "bias", "over", "under", "psnr_db", "flip"];
 
 #[test]
 fn a_reference_gives_every_figure_its_standard_error() {
@@ -83,6 +83,8 @@ fn a_reference_gives_every_figure_its_standard_error() {
     assert!((number(&error["bias"]) / (0.1 * mean) - 1.0).abs() < 1e-4, "{error}");
     assert!((number(&error["mae"]) / (0.1 * mean) - 1.0).abs() < 1e-4, "{error}");
     assert_eq!(number(&error["under"]), 0.0);
+    let of_mean = number(&error["rmse"]) / number(&report["reference"]["irradiance_indirect_mean"]);
+    assert!((number(&error["nrmse"]) / of_mean - 1.0).abs() < 1e-9, "{error}");
     let known = &report["reference"];
     assert_eq!((&known["file"], &known["spp"]), (&json!(text(&reference)), &Value::Null));
     assert!(number(&known["standard_error_mean"]) > 0.0 && number(&known["irradiance_indirect_mean"]) > 0.0);
@@ -104,7 +106,7 @@ fn a_reference_that_is_the_picture_itself_has_no_error() {
     let rooms = Rooms::new();
     let report = rooms.render("run", &rooms.reference("same.exr", 1.0, Some(0.0)));
     let error = &report["methods"][2]["error"];
-    for figure in ["mae", "rmse", "relmse", "bias", "over", "under", "flip"] {
+    for figure in ["mae", "rmse", "nrmse", "relmse", "bias", "over", "under", "flip"] {
         assert_eq!(number(&error[figure]), 0.0, "{figure}");
     }
     assert!(error["psnr_db"].is_null() && error["verdict"].is_null(), "{error}");
@@ -131,7 +133,7 @@ fn a_reference_without_variance_is_told_from_one_with() {
     let words = ["render", text(&rooms_scene), text(&rooms.baked.path), "-o", text(&output), "--size", SIZE];
     let shown = succeed(&[&words[..], &["--reference-image", text(&reference)]].concat()).stdout;
     assert_eq!(shown.matches("no error estimate").count(), 1, "{shown}");
-    assert!(shown.contains("error (rmse)") && shown.contains("in corners") && shown.contains("elsewhere"), "{shown}");
+    assert!(shown.contains("error (nrmse)") && shown.contains("in corners") && shown.contains("elsewhere"), "{shown}");
 }
 
 #[test]

@@ -123,6 +123,8 @@ fn pair(above: Vec2, below: Vec2) -> Volume {
         positions: vec![Vec3::ZERO, Vec3::X],
         irradiance: IrradianceStore::default().zeros(2, 1),
         occlusion: Occlusion::Moments(distance),
+        radiance: Default::default(),
+        layout: Default::default(),
     }
 }
 

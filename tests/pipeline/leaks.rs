@@ -54,6 +54,34 @@ fn a_sealed_wall_leaks_without_visibility_and_not_with_it() {
     assert!((mean(&folder, "lit", "visibility_on") / reported - 1.0).abs() < 1e-3);
 }
 
+/// The share that the report gives is that of the pictures' own pixels.
+#[test]
+fn blocks_are_the_pixels_that_are_off_by_a_quarter() {
+    let folder = Folder::new();
+    let baked = bake(&folder, &scene("two_rooms_open"), SPACING);
+    let report = view(&folder, "two_rooms_open", &baked, "dark");
+    let exact: Vec<f32> = irradiance(&folder, "dark", "visibility_ray").into_iter().map(luminance).collect();
+    let least = 0.01 * exact.iter().sum::<f32>() / exact.len() as f32;
+    for name in ["visibility_off", "visibility_on", "visibility_ray"] {
+        let shown = irradiance(&folder, "dark", name);
+        let is_off = |(e, exact): &(&Vec3, &f32)| (luminance(**e) - **exact).abs() > 0.25 * exact.max(least);
+        let share = shown.iter().zip(&exact).filter(is_off).count() as f64 / exact.len() as f64;
+        let reported = method(&report, name)["leak"]["blocks"].as_f64().unwrap();
+        // Of 9216 pixels, each of which shows one point: one may fall to the other side by rounding.
+        assert!((reported - share).abs() < 2e-4, "{name}: {reported} {share}");
+        let unseen = method(&report, name)["leak"]["unseen"].as_f64().unwrap();
+        assert_eq!((unseen, method(&report, name)["outside_hull"].as_f64()), (0.0, Some(0.0)), "{name}");
+        assert_eq!(reported > 0.05, name == "visibility_off", "{name}: {reported}");
+    }
+    assert_eq!(method(&report, "visibility_ray")["leak"]["blocks"], 0.0);
+    // Probes in the lit room alone: what the camera in the other one sees lies beyond them.
+    let bounds = "--set grid.bounds=(min:(-4,0,-2),max:(-0.2,2.5,2))";
+    let half = bake(&folder, &scene("two_rooms_open"), &format!("{SPACING} {bounds}"));
+    let report = view(&folder, "two_rooms_open", &half, "dark");
+    let outside = method(&report, "visibility_on")["outside_hull"].as_f64().unwrap();
+    assert!(outside > 0.5 && outside <= 1.0, "{outside}");
+}
+
 #[test]
 fn the_far_room_is_lit_through_the_passage() {
     let folder = Folder::new();

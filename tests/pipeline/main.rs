@@ -1,6 +1,7 @@
 //! The pipeline as its users meet it: the built program on scenes from `scenes/` and built in code. What it writes is read by a decoder of the tests' own ([`probe_file`]), so that an error which bake and query
 //! share cannot hide.
 
+mod air;
 mod care;
 mod closed_forms;
 mod command_line;
@@ -17,6 +18,7 @@ mod leaks;
 mod plan;
 mod probe_file;
 mod program;
+mod published;
 mod reading;
 mod reference;
 mod reports;

@@ -87,25 +87,39 @@ impl ProbeFile {
 
     /// A texel of the irradiance tensor as it is stored, its scale applied; row and column count the border.
     pub fn stored(&self, probe: usize, row: usize, column: usize) -> Vector {
-        let tensor = self.tensor("irradiance");
+        self.color("irradiance", probe, row, column)
+    }
+
+    /// The same of any tensor of colours.
+    pub fn color(&self, name: &str, probe: usize, row: usize, column: usize) -> Vector {
+        let tensor = self.tensor(name);
         let (rows, columns) = (tensor.shape[1], tensor.shape[2]);
         let texel = (probe * rows + row) * columns + column;
-        let scale: f64 = self.metadata["scale.irradiance"].parse().unwrap();
+        let scale: f64 = self.metadata[&format!("scale.{name}")].parse().unwrap();
         let raw = match tensor.dtype.as_str() {
             "F32" => std::array::from_fn(|i| f64::from(f32_at(&tensor.bytes[texel * 12 + 4 * i..]))),
             "F16" => std::array::from_fn(|i| {
                 let at = texel * 6 + 2 * i;
                 let bits = u16::from_le_bytes([tensor.bytes[at], tensor.bytes[at + 1]]);
-                assert_eq!(bits >> 15, 0, "negative irradiance");
+                assert_eq!(bits >> 15, 0, "negative {name}");
                 small_float(u32::from(bits & 0x7FFF), 10)
             }),
             "U32" => {
                 let bits = u32::from_le_bytes(tensor.bytes[texel * 4..texel * 4 + 4].try_into().unwrap());
                 [small_float(bits & 0x7FF, 6), small_float(bits >> 11 & 0x7FF, 6), small_float(bits >> 22, 5)]
             }
-            other => panic!("irradiance is {other}"),
+            other => panic!("{name} is {other}"),
         };
         raw.map(|v| v * scale)
+    }
+
+    /// A number of a tensor of f16.
+    pub fn half(&self, name: &str, index: usize) -> f64 {
+        let tensor = self.tensor(name);
+        assert_eq!(tensor.dtype, "F16");
+        let bits = u16::from_le_bytes([tensor.bytes[2 * index], tensor.bytes[2 * index + 1]]);
+        let size = small_float(u32::from(bits & 0x7FFF), 10);
+        if bits >> 15 == 1 { -size } else { size }
     }
 
     /// Irradiance of a stored value, W·m⁻².

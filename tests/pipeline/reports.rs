@@ -222,18 +222,28 @@ fn render_reports() {
                 "leak.fraction",
                 "leak.weight",
                 "leak.unseen",
+                "leak.blocks",
+                "outside_hull",
+                "air.points",
+                "air.leak_light",
+                "air.leak_dark",
+                "air.black",
+                "air.unseen",
             ],
         );
         let shade = |key: &str| method["shade_ms"][key].as_f64().unwrap();
         assert!(shade("min") <= shade("median") && shade("median") <= shade("max"), "{method}");
-        for share in ["fraction", "weight", "unseen"] {
+        for share in ["fraction", "weight", "unseen", "blocks"] {
             assert!(method["leak"][share].as_f64().unwrap() <= 1.0, "{method}");
         }
         assert_eq!(method["bytes_per_probe"], baked.report["bytes_per_probe"]["runtime_kept"]);
     }
     // Exact visibility is what the others are measured against.
+    for key in ["leak_light", "leak_dark"] {
+        assert_eq!(methods[2]["air"][key], 0.0, "{key}");
+    }
     let exact = &methods[2]["leak"];
-    for key in ["light", "dark", "fraction", "weight"] {
+    for key in ["light", "dark", "fraction", "weight", "blocks"] {
         assert_eq!(exact[key], 0.0, "{key}");
     }
 }

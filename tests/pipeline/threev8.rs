@@ -9,7 +9,7 @@ use crate::probe_file::ProbeFile;
 use crate::program::{bake, method, refuse, render, scene, succeed, text};
 
 /// Few rays, which the published cube maps have many of.
-const COARSE: &str = "--set capture.rays.octahedral.resolution=24";
+const COARSE: &str = "--set capture.rays.cube.face=10";
 
 fn numbers<const N: usize, T>(file: &ProbeFile, tensor: &str, of: impl Fn([u8; N]) -> T) -> Vec<T> {
     file.tensors[tensor].bytes.as_chunks::<N>().0.iter().map(|b| of(*b)).collect()

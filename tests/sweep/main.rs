@@ -99,7 +99,10 @@ fn a_sweep_writes_report_table_and_plots() {
     for configuration in configurations {
         assert_eq!(list(configuration, "runs").len(), 2);
         for (name, figure) in configuration["figures"].as_object().expect("figures") {
-            // Each is known here, and its mean lies between its ends.
+            // Each is known here but one: the picture has no dark region. Its mean lies between its ends.
+            if name == "leak_dark_region" {
+                continue;
+            }
             let [min, mean, max] = ["min", "mean", "max"].map(|part| number(&figure[part]));
             let rounding = 1e-12 * mean.abs();
             assert!(min <= mean + rounding && mean <= max + rounding, "{name}: {figure}");
@@ -299,6 +302,67 @@ fn methods_are_compared_at_equal_cost() {
     }
 }
 
+/// Every preset that is a method has a row and a picture; `path` has none.
+#[test]
+fn all_methods_are_compared_in_one_table_and_one_picture() {
+    let folder = Folder::new();
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/scenes/two_rooms_open.ron");
+    // Few probes: presets that store much are quick too.
+    let words = format!("--preset all --config {} --set grid.spacing_m=3 --equal positions", text(&config));
+    let shown = sweep(&folder, "out", &format!("{words} --size 32x18 --reference 32 --seeds 1"));
+    for part in ["in corners", "dark region", "memory per probe", "at equal positions"] {
+        assert!(shown.stdout.contains(part), "no '{part}' in {}", shown.stdout);
+    }
+    let report = report(&folder, "out");
+    let labels: Vec<&str> = list(&report, "configurations").iter().map(|c| c["label"].as_str().unwrap()).collect();
+    let names: Vec<&str> = lightprobe::config::presets::methods().map(|preset| preset.name).collect();
+    assert!(labels == names && names.contains(&"default") && !names.contains(&"path"), "{labels:?}");
+    assert!(list(&report, "floor").is_empty());
+    for configuration in list(&report, "configurations") {
+        let figures = &configuration["figures"];
+        for figure in
+            ["error_nrmse", "error_corner", "error_flat", "leak_blocks", "outside_hull", "air_error", "air_black"]
+        {
+            assert!(number(&figures[figure]["mean"]) >= 0.0, "{figure}: {figures}");
+        }
+        assert_eq!(figures["error_nrmse"]["mean"], figures["error_relative"]["mean"]);
+    }
+    // Pictures of 32×18, ten times as large, in rows of at most four below labels of 40 px and above their maps.
+    let sheet = lightprobe::image::Picture8::read_png(&folder.path().join("out/contact.png")).unwrap();
+    let rows = (names.len() as u32 + 1).div_ceil(4);
+    assert_eq!(sheet.height, rows * (40 + 2 * 180 + 12) + 82);
+    assert!(sheet.width >= 2 * (320 + 12) + 12, "{}", sheet.width);
+}
+
+#[test]
+fn offsets_shift_the_grid_and_give_geometric_means() {
+    let folder = Folder::new();
+    let words =
+        "--size 32x18 --reference 32 --set placement.rays=32 --set solver.max_bounces=2 --set capture.resolution=4";
+    let words = format!("{words} --set grid.spacing_m=1.5 --seeds 2 --offsets 3");
+    let shown = sweep(&folder, "out", &words);
+    assert!(shown.stdout.contains("geometric means over 3 offsets"), "{}", shown.stdout);
+    let report = report(&folder, "out");
+    let offsets = list(&report, "offsets");
+    assert_eq!(offsets.len(), 3);
+    let configuration = &list(&report, "configurations")[0];
+    let runs = list(configuration, "runs");
+    // Two seeds on each of three grids, whose probes stand elsewhere.
+    let places: BTreeSet<&str> = runs.iter().map(|run| run["probes_blake3"].as_str().unwrap()).collect();
+    assert!(runs.len() == 6 && places.len() >= 3, "{places:?}");
+    for (i, run) in runs.iter().enumerate() {
+        assert_eq!(run["offset"], offsets[i / 2]);
+    }
+    let errors: Vec<f64> = runs.iter().map(|run| number(&run["methods"][1]["error_relative"])).collect();
+    let geometric = (errors.iter().map(|e| e.ln()).sum::<f64>() / 6.0).exp();
+    let figure = &configuration["figures"]["error_relative"];
+    assert!((number(&figure["geometric_mean"]) / geometric - 1.0).abs() < 1e-9, "{figure}");
+    assert!((number(&figure["mean"]) / (errors.iter().sum::<f64>() / 6.0) - 1.0).abs() < 1e-9, "{figure}");
+    // Another sweep goes on with more grids, and keeps what it has.
+    let more = sweep(&folder, "out", &words.replace("--offsets 3", "--offsets 4"));
+    assert!(more.stdout.contains("6 runs kept"), "{}", more.stdout);
+}
+
 #[test]
 fn what_cannot_be_swept_is_refused_before_any_work() {
     let folder = Folder::new();
@@ -337,7 +401,7 @@ fn what_cannot_be_swept_is_refused_before_any_work() {
 #[test]
 fn the_ladders_of_the_project_are_read() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/sweeps");
-    let method = || [lightprobe::sweep::ladder::Method::new(None, &[]).unwrap()];
+    let method = || [lightprobe::sweep::method::Method::new(None, &[]).unwrap()];
     let mut most = 0;
     for name in names_in(&folder) {
         let file = lightprobe::sweep::ladder::LadderFile::read(&folder.join(&name)).unwrap_or_else(|e| panic!("{e}"));

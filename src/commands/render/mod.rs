@@ -17,7 +17,7 @@ use super::session::{Opening, Session, inputs};
 use super::{Console, check_scene, tell, write_json};
 use crate::cli::RenderArgs;
 use crate::config::Config;
-use crate::evaluate::{BakedTruth, Comparison, PATH_RAY, Scenery, Shaded};
+use crate::evaluate::{BakedTruth, Comparison, PATH_RAY, Scenery, Seen, Shaded};
 use crate::light::World;
 use crate::probe::Volume;
 use crate::probe::file::{self, ProbeFile};
@@ -132,19 +132,22 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
     let (args, session, volume) = (run.args, run.session, &run.volume);
     let settings = &run.probes.query.weights;
     let query = Query { volume, settings };
-    let bar = session.console.progress.stage("rendering", 2 + VisibilityMode::ALL.len());
+    let bar = session.console.progress.stage("rendering", 3 + VisibilityMode::ALL.len());
     let primary_started = Instant::now();
     let view = see(run.world, camera, args.view.size.width, args.view.size.height, session.seed);
     let primary_s = primary_started.elapsed().as_secs_f64();
     bar.inc(1);
-    let scenery = Scenery { world: run.world, view: &view, primary_s };
+    let scenery = Scenery { world: run.world, view: &view, primary_s, seed: session.seed };
     let (masks, masks_s) = scenery.masks(&query);
     bar.inc(1);
-    let mut shaded = scenery.shade(&query, &masks, masks_s, run.probes.runtime_bytes(), || bar.inc(1));
+    let air = scenery.air(&query);
+    bar.inc(1);
+    let seen = Seen { masks: &masks, masks_s, air: &air };
+    let mut shaded = scenery.shade(&query, seen, run.probes.runtime_bytes(), || bar.inc(1));
     // What is left of the error when the probes are right and visibility exact comes from interpolation between probes.
     let mut path_traced = run.truth.as_ref().map(|BakedTruth { truth, .. }| {
         let query = Query { volume: &truth.volume, settings };
-        scenery.shade_again(&query, &masks, VisibilityMode::Ray, PATH_RAY, &shaded[2].report)
+        scenery.shade_again(&query, seen, VisibilityMode::Ray, PATH_RAY, &shaded[2].report)
     });
     let baked = run.truth.as_ref().map(|t| t.report.clone());
     for s in &mut shaded {
@@ -156,6 +159,10 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
     let exposure_ev = args.exposure.unwrap_or_else(|| exposure(&shaded[2], reference.as_ref()));
     if let Some(reference) = &reference {
         compare(run, reference, exposure_ev, shaded.iter_mut().chain(&mut path_traced));
+    }
+    if let Some(spp) = args.reference {
+        let truth = air.truth(run.world, spp, session.seed);
+        shaded.iter_mut().chain(&mut path_traced).for_each(|shaded| shaded.compare_in_air(&truth));
     }
     create_folder(folder)?;
     pictures::write(volume, (camera, &view), &shaded, reference.as_ref(), exposure_ev, folder)?;

@@ -18,14 +18,15 @@ pub fn table(report: &RenderReport) -> String {
         ("memory per probe", Column::Number),
         ("leak light", Column::Number),
         ("leak dark", Column::Number),
+        ("blocks", Column::Number),
         ("hidden share", Column::Number),
         ("irradiance", Column::Number),
-        ("error (rmse)", Column::Number),
+        ("error (nrmse)", Column::Number),
     ]);
     let percent = |share: Option<f64>| share.map_or(format::UNDEFINED.to_owned(), format::percent);
     let mean = report.reference.as_ref().and_then(|r| r.irradiance_indirect_mean);
     for method in &report.methods {
-        let error = errors_of(method).map(|e| relative_rmse(&e.all, mean));
+        let error = errors_of(method).map(|e| relative_rmse(&e.all));
         table.push([
             if method.name == PATH_RAY { "path-traced probes" } else { "probes" }.to_owned(),
             visibility(method).to_owned(),
@@ -35,6 +36,7 @@ pub fn table(report: &RenderReport) -> String {
             format::bytes(method.bytes_per_probe.round() as u64),
             percent(method.leak.light),
             percent(method.leak.dark),
+            percent(method.leak.blocks),
             percent(method.leak.fraction),
             method.irradiance_indirect_mean.map_or(format::UNDEFINED.to_owned(), |e| format::significant(e, 4)),
             error.unwrap_or_else(|| format::UNDEFINED.to_owned()),
@@ -48,6 +50,7 @@ pub fn table(report: &RenderReport) -> String {
         report.exposure_ev,
         format::percent(report.methods.first().map_or(0.0, |m| m.leak.unseen)),
     );
+    text.extend(report.methods.iter().map(|method| format!("\n{}", air_line(method))));
     let baked = report.baked.as_ref().filter(|b| b.figures.bias.is_some()).map(baked_line);
     for line in error_lines(report, mean).into_iter().chain(baked) {
         text.push('\n');
@@ -72,12 +75,12 @@ fn label(method: &MethodReport) -> &'static str {
 
 /// Root mean square error ÷ mean irradiance of the reference, with the standard error that its noise gives it. Where the reference is
 /// black, in W·m⁻².
-fn relative_rmse(measured: &ErrorEstimate, mean: Option<f64>) -> String {
-    let Some(rmse) = measured.figures.rmse else { return format::UNDEFINED.to_owned() };
-    let error = measured.standard_error.rmse;
-    match mean.filter(|mean| *mean > 0.0) {
-        Some(mean) => format!("{} %", format::with_error(100.0 * rmse / mean, error.map(|e| 100.0 * e / mean))),
-        None => format!("{} W·m⁻²", format::with_error(rmse, error)),
+fn relative_rmse(measured: &ErrorEstimate) -> String {
+    let (figures, errors) = (&measured.figures, &measured.standard_error);
+    match (figures.nrmse, figures.rmse) {
+        (Some(nrmse), _) => format!("{} %", format::with_error(100.0 * nrmse, errors.nrmse.map(|e| 100.0 * e))),
+        (None, Some(rmse)) => format!("{} W·m⁻²", format::with_error(rmse, errors.rmse)),
+        (None, None) => format::UNDEFINED.to_owned(),
     }
 }
 
@@ -110,11 +113,28 @@ fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {
         }
         let share = format::percent(pixels as f64 / first.all.pixels.max(1) as f64);
         let figures: Vec<String> =
-            errors.iter().map(|(visibility, e)| format!("{visibility} {}", relative_rmse(region(e), mean))).collect();
+            errors.iter().map(|(visibility, e)| format!("{visibility} {}", relative_rmse(region(e)))).collect();
         lines.push(format!("  {name} ({share} of the picture's surfaces): {}", figures.join(", ")));
     }
     lines.extend(verdicts(&errors));
     lines
+}
+
+/// What moving objects get.
+fn air_line(method: &MethodReport) -> String {
+    let air = &method.air;
+    let percent = |share: Option<f64>| share.map_or(format::UNDEFINED.to_owned(), format::percent);
+    let error = air.error.map_or_else(String::new, |error| {
+        format!("error {} %, ", format::with_error(100.0 * error, air.standard_error.error.map(|e| 100.0 * e)))
+    });
+    format!(
+        "{} in the air ({} points): {error}leak light {}, leak dark {}, black {}",
+        label(method),
+        air.points,
+        percent(air.leak_light),
+        percent(air.leak_dark),
+        percent(air.black)
+    )
 }
 
 /// What is wrong with the probes themselves.

@@ -9,9 +9,11 @@ use crate::cli::{EqualName, SweepArgs};
 use crate::commands::session::set_sky;
 use crate::config::{Config, presets};
 use crate::light::World;
+use crate::probe::lattice::grid::GridError;
 use crate::scene::Scene;
-use crate::sweep::ladder::{Ladder, LadderFile, Method, check_shared, expand};
-use crate::sweep::{SweepError, equal};
+use crate::sweep::ladder::{Ladder, LadderFile, check_shared, expand};
+use crate::sweep::method::Method;
+use crate::sweep::{SweepError, equal, offsets};
 use crate::system::output::Named;
 
 /// All configurations, in the order in which they run.
@@ -28,9 +30,9 @@ pub fn ladders(args: &SweepArgs, file: Option<&LadderFile>) -> Result<Vec<Ladder
 /// preset; without presets each is a method of its own.
 fn methods(args: &SweepArgs, file: Option<&LadderFile>) -> Result<Vec<Method>> {
     let mut methods: Vec<Method> = Vec::new();
-    let all = presets::PRESETS.iter().map(|preset| preset.name);
     for name in &args.preset {
-        let named: Vec<&str> = if name == "all" { all.clone().collect() } else { vec![name] };
+        let all = || presets::methods().map(|preset| preset.name).collect();
+        let named: Vec<&str> = if name == "all" { all() } else { vec![name] };
         for name in named {
             methods.push(Method::new(Some(name), &args.config)?);
         }
@@ -54,6 +56,13 @@ fn methods(args: &SweepArgs, file: Option<&LadderFile>) -> Result<Vec<Method>> {
     Ok(methods)
 }
 
+/// Whether to find out what limits the best of each ladder. Where presets stand side by side they are compared with each
+/// other, and maps of twice their resolution would take longer than all else.
+pub fn wants_floors(args: &SweepArgs) -> bool {
+    let several = args.preset.len() > 1 || args.preset.iter().any(|name| name == "all");
+    args.ladder.is_some() && !several
+}
+
 /// Files that configurations come from.
 pub fn configurations(args: &SweepArgs, file: Option<&LadderFile>) -> Vec<Named> {
     let named = |path: &PathBuf| Named::new("a configuration", path);
@@ -69,11 +78,20 @@ pub fn shared(ladders: &[Ladder]) -> Result<(&Config, bool)> {
     Ok((first, configs().any(|config| config.plan.keeps_everything())))
 }
 
+/// Shifts the grids by `--offsets`; the shifts.
+pub fn shift(args: &SweepArgs, ladders: &mut [Ladder], scene: &Scene) -> Result<Vec<[f64; 3]>, SweepError> {
+    let Some(count) = args.offsets else { return Ok(Vec::new()) };
+    let fractions = offsets::fractions(args.trace.seed, count);
+    let named = |(label, cause): (String, GridError)| SweepError::Bake { label, cause: cause.into() };
+    offsets::shift_all(ladders, scene, &fractions).map_err(named)?;
+    Ok(fractions)
+}
+
 /// Refuses what cannot be baked, before anything is traced.
 pub fn check_all(ladders: &[Ladder], scene: &Scene) -> Result<(), SweepError> {
     for rung in ladders.iter().flat_map(|ladder| &ladder.rungs) {
         let named = |cause| SweepError::Bake { label: rung.label.clone(), cause };
-        bake::check(&rung.config, scene).map_err(named)?;
+        rung.configs().into_iter().try_for_each(|(_, config)| bake::check(config, scene).map_err(named))?;
     }
     Ok(())
 }
@@ -83,11 +101,13 @@ pub fn check_captures(ladders: &[Ladder], world: &World, seed: u64) -> Result<()
     let circumstances = Circumstances::quiet(seed);
     for rung in ladders.iter().flat_map(|ladder| &ladder.rungs) {
         let named = |cause| SweepError::Bake { label: rung.label.clone(), cause };
-        if bake::surely_fits(&rung.config, world.scene).map_err(named)? {
-            continue;
+        for (_, config) in rung.configs() {
+            if bake::surely_fits(config, world.scene).map_err(named)? {
+                continue;
+            }
+            let prepared = bake::prepare(world, config, &circumstances).map_err(named)?;
+            prepared.check_memory(&circumstances).map_err(|cause| named(cause.into()))?;
         }
-        let prepared = bake::prepare(world, &rung.config, &circumstances).map_err(named)?;
-        prepared.check_memory(&circumstances).map_err(|cause| named(cause.into()))?;
     }
     Ok(())
 }

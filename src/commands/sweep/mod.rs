@@ -3,6 +3,7 @@
 mod methods;
 mod outputs;
 mod reference;
+mod sheet;
 mod summary;
 mod table;
 mod work;
@@ -11,7 +12,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 
-use self::methods::{check_all, check_captures, configurations, ladders, shared};
+use self::methods::{check_all, check_captures, configurations, ladders, shared, shift, wants_floors};
 use self::work::Work;
 use super::camera::cameras;
 use super::session::{Opening, Session, list_presets, lists_presets};
@@ -24,7 +25,7 @@ use crate::shade::points::see;
 use crate::shade::reference::ReferenceSettings;
 use crate::shade::regions::regions;
 use crate::sweep::ladder::LadderFile;
-use crate::sweep::run::Setting;
+use crate::sweep::run::{Setting, Truths};
 use crate::sweep::store::Store;
 use crate::system::output::{Named, check_folder, create_folder};
 
@@ -39,7 +40,7 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
         bail!("--camera all: a sweep is of one camera; name one");
     }
     let file = args.ladder.as_deref().map(LadderFile::read).transpose()?;
-    let ladders = ladders(args, file.as_ref())?;
+    let mut ladders = ladders(args, file.as_ref())?;
     let (config, keep_images) = shared(&ladders)?;
     let outputs: Vec<Named> = outputs::FILES.iter().map(|name| Named::new("-o", args.output.join(name))).collect();
     check_folder(&args.output)?;
@@ -55,6 +56,8 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
     };
     let session = Session::open(opening, console)?;
     check_all(&ladders, &session.scene)?;
+    let offsets = shift(args, &mut ladders, &session.scene)?;
+    check_all(&ladders, &session.scene)?;
     check_picture_memory(args.view.size, PIXEL_BYTES)?;
     let (world, accel_build_s) = session.world()?;
     let camera =
@@ -66,7 +69,8 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
     let reference = reference::obtain(args, &world, &camera, &settings, console)?;
     let primary_started = Instant::now();
     let view = see(&world, &camera, args.view.size.width, args.view.size.height, session.seed);
-    let scenery = Scenery { world: &world, view: &view, primary_s: primary_started.elapsed().as_secs_f64() };
+    let primary_s = primary_started.elapsed().as_secs_f64();
+    let scenery = Scenery { world: &world, view: &view, primary_s, seed: session.seed };
     let regions = regions(&world, &view);
     let (mean, standard_error) = reference.layers.means(|i| regions[i].is_some());
     let exposure_ev = reference.layers.beauty.auto_exposure_ev();
@@ -82,13 +86,15 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
         reference_mean: mean.filter(|mean| *mean > 0.0),
         reference_settings: ReferenceSettings { spp: reference.spp, ..settings },
         store: Store::new(&args.output)?,
+        truths: Truths::default(),
         // Times depend on the threads.
         identity: format!("{}spp = {}\nthreads = {}\n", reference.identity.to_text(), reference.spp, session.threads),
     };
     let mut work = Work::new(&setting, &ladders, args, console);
     let outcomes = work.run_all()?;
     let sets = summary::ladders(&ladders, &outcomes);
-    let floor = work.floors(&sets, &outcomes)?;
+    let floor = if wants_floors(args) { work.floors(&sets, &outcomes)? } else { Vec::new() };
+    let shown = work.shown(&sets, &outcomes)?;
     work.bar.finish_and_clear();
 
     let report = summary::report(summary::Parts {
@@ -104,11 +110,14 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
             reference: reference.time_s.unwrap_or(0.0),
             total: session.elapsed_s(),
         },
+        offsets,
         ladders: sets,
         outcomes,
         floor,
     });
     outputs::write(&report, &args.output)?;
+    let contact = sheet::draw(&report, &setting.scenery, &reference.layers, &regions, &shown);
+    contact.write_png(&args.output.join(sheet::FILE))?;
     outputs.iter().for_each(|output| tell::written(console, &output.path));
     let from_before = if work.kept > 0 { format!(", {} runs kept from before", work.kept) } else { String::new() };
     session.print(&report, || format!("{}\nwrote {}{from_before}", table::text(&report), args.output.display()))

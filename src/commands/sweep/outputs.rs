@@ -6,13 +6,14 @@ use anyhow::{Context, Result};
 
 use crate::commands::write_json;
 use crate::report::plot::{Chart, Guide, Mark, Series};
-use crate::report::sweep::{Aggregate, ConfigurationReport, LadderReport, PerFront, SweepReport};
+use crate::report::sweep::{ConfigurationReport, LadderReport, PerFront, SweepReport};
 use crate::system::format;
 use crate::system::output::write_atomically;
 
 /// All that a sweep's folder gets besides its runs.
 pub const FILES: &[&str] = &[
     super::reference::FILE,
+    super::sheet::FILE,
     "sweep.json",
     "sweep.csv",
     "error_time.svg",
@@ -49,6 +50,7 @@ fn csv(report: &SweepReport) -> Result<Vec<u8>> {
                 ("method", ladder.method.clone()),
                 ("label", configuration.label.clone()),
                 ("seed", run.seed.to_string()),
+                ("offset", run.offset.map_or_else(String::new, |shift| shift.map(|x| format!("{x:.6}")).join(" "))),
                 ("probes", run.probes.to_string()),
                 ("probes_active", run.probes_active.to_string()),
                 ("bytes", run.bytes.to_string()),
@@ -71,8 +73,18 @@ fn csv(report: &SweepReport) -> Result<Vec<u8>> {
                 ("leak_dark", number(m.leak.dark)),
                 ("leak_fraction", number(m.leak.fraction)),
                 ("leak_unseen", m.leak.unseen.to_string()),
+                ("leak_blocks", number(m.leak.blocks)),
+                ("leak_dark_region", number(m.leak.dark_region)),
+                ("outside_hull", number(m.outside_hull)),
+                ("air_error", number(m.air.error)),
+                ("air_leak_light", number(m.air.leak_light)),
+                ("air_leak_dark", number(m.air.leak_dark)),
+                ("air_black", number(m.air.black)),
                 ("error_relative", number(m.error_relative)),
+                ("error_corner", number(m.error_corner)),
+                ("error_flat", number(m.error_flat)),
                 ("error_rmse", number(e.rmse)),
+                ("error_nrmse", number(e.nrmse)),
                 ("error_relmse", number(e.relmse)),
                 ("error_mae", number(e.mae)),
                 ("error_bias", number(e.bias)),
@@ -105,9 +117,10 @@ fn charts(report: &SweepReport) -> [(&'static str, Chart); 4] {
     let chart = |title: &str, x: Along, y: Along, front: fn(&PerFront<Vec<usize>>) -> &Vec<usize>| {
         let series =
             report.ladders.iter().map(|ladder| series(report, ladder, &x, &y, front(&ladder.fronts))).collect();
-        let seeds = match report.seeds.len() {
-            1 => "one seed".to_owned(),
-            n => format!("mean of {n} seeds, bars from least to most"),
+        let seeds = match (report.seeds.len(), report.offsets.len()) {
+            (1, 0) => "one seed".to_owned(),
+            (n, 0) => format!("mean of {n} seeds, bars from least to most"),
+            (_, n) => format!("geometric mean of {n} offsets of the grid, bars from least to most"),
         };
         Chart {
             title: title.to_owned(),
@@ -145,8 +158,8 @@ fn charts(report: &SweepReport) -> [(&'static str, Chart); 4] {
 }
 
 fn figure(configuration: &ConfigurationReport, along: &Along) -> Option<[f64; 3]> {
-    let Aggregate { mean, min, max, .. } = *configuration.figures.get(along.figure)?;
-    Some([mean?, min?, max?].map(|v| v * along.factor))
+    let all = configuration.figures.get(along.figure)?;
+    Some([all.typical()?, all.min?, all.max?].map(|v| v * along.factor))
 }
 
 fn series(report: &SweepReport, ladder: &LadderReport, x: &Along, y: &Along, front: &[usize]) -> Series {

@@ -20,6 +20,7 @@ use crate::sweep::split::Split;
 
 /// A configuration after all its runs.
 pub struct Outcome {
+    /// Of its first run.
     pub config: Config,
     pub report: ConfigurationReport,
 }
@@ -39,9 +40,19 @@ const FIGURES: &[(&str, Figure)] = &[
     ("leak_dark", |_, m| m.leak.dark),
     ("leak_fraction", |_, m| m.leak.fraction),
     ("leak_unseen", |_, m| Some(m.leak.unseen)),
+    ("leak_blocks", |_, m| m.leak.blocks),
+    ("leak_dark_region", |_, m| m.leak.dark_region),
+    ("outside_hull", |_, m| m.outside_hull),
+    ("air_error", |_, m| m.air.error),
+    ("air_leak_light", |_, m| m.air.leak_light),
+    ("air_leak_dark", |_, m| m.air.leak_dark),
+    ("air_black", |_, m| m.air.black),
     ("error_relative", |_, m| m.error_relative),
+    ("error_corner", |_, m| m.error_corner),
+    ("error_flat", |_, m| m.error_flat),
     ("error_mae", |_, m| m.error.mae),
     ("error_rmse", |_, m| m.error.rmse),
+    ("error_nrmse", |_, m| m.error.nrmse),
     ("error_relmse", |_, m| m.error.relmse),
     ("error_bias", |_, m| m.error.bias),
     ("error_flip", |_, m| m.error.flip),
@@ -52,9 +63,11 @@ impl Outcome {
         let value = |figure: Figure| -> Vec<Option<f64>> {
             runs.iter().map(|run| figure(run, run.method(VisibilityMode::On.name())?)).collect()
         };
+        let over_runs = if rung.shifted.is_empty() { Aggregate::of } else { Aggregate::over_grids };
         let figures: BTreeMap<&'static str, Aggregate> =
-            FIGURES.iter().map(|(name, figure)| (*name, Aggregate::of(&value(*figure)))).collect();
+            FIGURES.iter().map(|(name, figure)| (*name, over_runs(&value(*figure)))).collect();
         let relative = |value: Option<f64>| Some(value? / reference_mean?);
+        let first = rung.configs().first().map_or(&rung.config, |(_, config)| config).clone();
         let report = ConfigurationReport {
             label: rung.label.clone(),
             ladder,
@@ -70,12 +83,12 @@ impl Outcome {
             on_front: PerFront::default(),
             runs,
         };
-        Outcome { config: rung.config.clone(), report }
+        Outcome { config: first, report }
     }
 
     /// NaN where it is undefined, which is on no front.
     fn mean(&self, figure: &str) -> f64 {
-        self.report.figures.get(figure).and_then(|a| a.mean).unwrap_or(f64::NAN)
+        self.report.figures.get(figure).and_then(Aggregate::typical).unwrap_or(f64::NAN)
     }
 }
 
@@ -122,6 +135,7 @@ pub struct Parts<'a> {
     pub reference: ReferenceSummary,
     pub exposure_ev: f32,
     pub times: SweepTimes,
+    pub offsets: Vec<[f64; 3]>,
     pub ladders: Vec<LadderReport>,
     pub outcomes: Vec<Outcome>,
     pub floor: Vec<FloorReport>,
@@ -165,6 +179,7 @@ pub fn report(parts: Parts) -> SweepReport {
         points: parts.view.points.len(),
         exposure_ev: parts.exposure_ev,
         seeds: (0..u64::from(args.seeds)).map(|k| seed.wrapping_add(k)).collect(),
+        offsets: parts.offsets,
         error_figure: ERROR_FIGURE,
         reference: parts.reference,
         time_s: parts.times,

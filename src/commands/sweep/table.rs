@@ -1,6 +1,8 @@
 //! A sweep's report for people.
 
-use crate::report::sweep::{AxisValue, CheapestAt, ConfigurationReport, EqualReport, FloorReport, SweepReport};
+use crate::report::sweep::{
+    Aggregate, AxisValue, CheapestAt, ConfigurationReport, EqualReport, FloorReport, SweepReport,
+};
 use crate::report::table::{Column, Table};
 use crate::system::format;
 
@@ -8,17 +10,21 @@ use crate::system::format;
 pub fn text(report: &SweepReport) -> String {
     let mut parts = vec![
         format!(
-            "camera {}, {}×{}, {} seeds, reference of {} samples per pixel; error: {}",
+            "camera {}, {}×{}, {} seeds{}, reference of {} samples per pixel; error: {}",
             report.camera,
             report.width,
             report.height,
             report.seeds.len(),
+            match report.offsets.len() {
+                0 => String::new(),
+                n => format!(", geometric means over {n} offsets of the grid"),
+            },
             format::or_undefined(report.reference.spp, |spp| spp.to_string()),
             report.error_figure,
         ),
-        configurations(report),
+        if is_comparison(report) { comparison(report) } else { configurations(report) },
     ];
-    if !report.cheapest.bake_s.is_empty() {
+    if !is_comparison(report) && !report.cheapest.bake_s.is_empty() {
         parts.push("the cheapest configuration for each error level".to_owned());
         parts.push(cheapest(report));
     }
@@ -32,6 +38,52 @@ pub fn text(report: &SweepReport) -> String {
 
 fn percent(value: Option<f64>) -> String {
     format::or_undefined(value, format::percent)
+}
+
+/// Whether every ladder is one point: methods side by side.
+fn is_comparison(report: &SweepReport) -> bool {
+    report.ladders.iter().all(|ladder| ladder.configurations.len() == 1)
+}
+
+/// A row for each method.
+fn comparison(report: &SweepReport) -> String {
+    let mut table = Table::new(&[
+        ("method", Column::Text),
+        ("probes", Column::Number),
+        ("error", Column::Number),
+        ("in corners", Column::Number),
+        ("elsewhere", Column::Number),
+        ("leak light", Column::Number),
+        ("leak dark", Column::Number),
+        ("blocks", Column::Number),
+        ("dark region", Column::Number),
+        ("error in air", Column::Number),
+        ("black in air", Column::Number),
+        ("bake", Column::Number),
+        ("shade", Column::Number),
+        ("memory per probe", Column::Number),
+    ]);
+    for c in &report.configurations {
+        let typical = |figure: &str| c.figures.get(figure).and_then(Aggregate::typical);
+        let share = |figure: &str| percent(typical(figure));
+        table.push([
+            c.label.clone(),
+            c.probes.to_string(),
+            error(c),
+            share("error_corner"),
+            share("error_flat"),
+            share("leak_light"),
+            share("leak_dark"),
+            share("leak_blocks"),
+            share("leak_dark_region"),
+            share("air_error"),
+            share("air_black"),
+            format::or_undefined(typical("bake_s"), format::seconds),
+            format::or_undefined(typical("shade_ms"), |ms| format::seconds(ms / 1e3)),
+            format::or_undefined(typical("bytes_per_probe"), |b| format::bytes(b.round() as u64)),
+        ]);
+    }
+    table.to_string()
 }
 
 fn configurations(report: &SweepReport) -> String {
@@ -48,7 +100,7 @@ fn configurations(report: &SweepReport) -> String {
         ("on the front of", Column::Text),
     ]);
     for c in &report.configurations {
-        let mean = |figure: &str| c.figures.get(figure).and_then(|a| a.mean);
+        let mean = |figure: &str| c.figures.get(figure).and_then(Aggregate::typical);
         table.push([
             c.label.clone(),
             c.probes.to_string(),
@@ -65,11 +117,11 @@ fn configurations(report: &SweepReport) -> String {
     table.to_string()
 }
 
-/// With half of what lies between the least and the most of the seeds.
+/// With half of what lies between the least and the most of the runs.
 fn error(configuration: &ConfigurationReport) -> String {
     let Some(error) = configuration.figures.get("error_relative") else { return format::UNDEFINED.to_owned() };
     let spread = error.max.zip(error.min).map(|(max, min)| 50.0 * (max - min));
-    format::or_undefined(error.mean, |mean| format!("{} %", format::with_error(100.0 * mean, spread)))
+    format::or_undefined(error.typical(), |mean| format!("{} %", format::with_error(100.0 * mean, spread)))
 }
 
 fn fronts(configuration: &ConfigurationReport) -> String {

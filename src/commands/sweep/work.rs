@@ -1,5 +1,7 @@
 //! The bakes of a sweep, one after the other: each has all threads.
 
+use super::methods::wants_floors;
+use super::sheet::Shown;
 use super::summary::Outcome;
 use crate::cli::SweepArgs;
 use crate::commands::Console;
@@ -7,7 +9,7 @@ use crate::evaluate::Comparison;
 use crate::report::sweep::{FloorReport, LadderReport};
 use crate::sweep::ladder::Ladder;
 use crate::sweep::run::{Finished, Setting};
-use crate::sweep::split::SeedScatter;
+use crate::sweep::split::{SeedScatter, Split};
 use crate::sweep::{SweepError, floor};
 
 pub struct Work<'a, 's> {
@@ -23,33 +25,52 @@ pub struct Work<'a, 's> {
 impl<'a, 's> Work<'a, 's> {
     pub fn new(setting: &'a Setting<'a, 's>, ladders: &'a [Ladder], args: &SweepArgs, console: &'a Console) -> Self {
         let seeds: Vec<u64> = (0..u64::from(args.seeds)).map(|k| args.trace.seed.wrapping_add(k)).collect();
-        let runs = ladders.iter().map(|ladder| ladder.rungs.len()).sum::<usize>() * seeds.len();
-        let bar = console.progress.stage("sweep", runs + floor::STEPS * ladders.len());
+        let rungs = ladders.iter().flat_map(|ladder| &ladder.rungs);
+        let runs = rungs.map(|rung| rung.configs().len()).sum::<usize>() * seeds.len();
+        let floors = if wants_floors(args) { floor::STEPS * ladders.len() } else { 0 };
+        let bar = console.progress.stage("sweep", runs + floors);
         Work { setting, ladders, seeds, console, bar, kept: 0 }
     }
 
-    /// Every configuration with every seed, in the order of the ladders.
+    /// Every configuration on every grid with every seed, in the order of the ladders.
     pub fn run_all(&mut self) -> Result<Vec<Outcome>, SweepError> {
         let view = self.setting.scenery.view;
         let mut all = Vec::new();
         for (ladder, rung) in self.ladders.iter().enumerate().flat_map(|(i, l)| l.rungs.iter().map(move |r| (i, r))) {
-            let mut scatter = SeedScatter::new(view.width as usize * view.height as usize);
-            let mut runs = Vec::new();
+            let (mut runs, mut splits) = (Vec::new(), Vec::new());
             self.bar.set_message(rung.label.clone());
-            for &seed in &self.seeds {
-                let warn = |what: String| self.console.warn(what);
-                let Finished { record, irradiance, kept } =
-                    self.setting.obtain(&rung.label, &rung.config, seed, warn)?;
-                scatter.add(&irradiance);
-                self.kept += usize::from(kept);
-                let from = if kept { "kept from before" } else { "done" };
-                self.console.say(format!("{}, seed {seed}: {from}, bake {:.3} s", rung.label, record.bake_s));
-                runs.push(record);
-                self.bar.inc(1);
+            for (offset, config) in rung.configs() {
+                let mut scatter = SeedScatter::new(view.width as usize * view.height as usize);
+                for &seed in &self.seeds {
+                    let warn = |what: String| self.console.warn(what);
+                    let Finished { mut record, irradiance, kept } =
+                        self.setting.obtain(&rung.label, config, seed, warn)?;
+                    scatter.add(&irradiance);
+                    self.kept += usize::from(kept);
+                    let from = if kept { "kept from before" } else { "done" };
+                    self.console.say(format!("{}, seed {seed}: {from}, bake {:.3} s", rung.label, record.bake_s));
+                    record.offset = offset;
+                    runs.push(record);
+                    self.bar.inc(1);
+                }
+                let Comparison { layers, regions, .. } = &self.setting.comparison;
+                splits.push(scatter.split(layers, regions));
             }
-            let Comparison { layers, regions, .. } = &self.setting.comparison;
-            let split = scatter.split(layers, regions);
-            all.push(Outcome::new(ladder, rung, runs, split, self.setting.reference_mean));
+            all.push(Outcome::new(ladder, rung, runs, Split::pooled(&splits), self.setting.reference_mean));
+        }
+        Ok(all)
+    }
+
+    /// What each ladder's best configuration shows: its first run, which is kept by now.
+    pub fn shown(&self, ladders: &[LadderReport], outcomes: &[Outcome]) -> Result<Vec<Shown>, SweepError> {
+        let mut all = Vec::new();
+        for ladder in ladders {
+            let best = ladder.best.or(ladder.configurations.first().copied());
+            let Some((configuration, best)) = best.and_then(|i| Some((i, outcomes.get(i)?))) else { continue };
+            let Some(seed) = self.seeds.first() else { continue };
+            let warn = |what: String| self.console.warn(what);
+            let Finished { irradiance, .. } = self.setting.obtain(&best.report.label, &best.config, *seed, warn)?;
+            all.push(Shown { configuration, irradiance });
         }
         Ok(all)
     }

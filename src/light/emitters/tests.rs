@@ -284,7 +284,7 @@ fn places_learn_what_they_see() {
     let scene = scene(&[CEILING, SCREEN, wall], Environment::None);
     let world = World::new(&scene, 1.0, 0.999).expect("Embree");
     let receiver = Receiver { normal: Vec3::Y, geometric_normal: Vec3::Y, ..ORIGIN };
-    let shares = world.learn(&[receiver], |_| true, &mut random(8));
+    let (shares, ..) = world.learn(&[receiver], |_| true, &mut random(8));
     let group =
         |t| world.emitters.pieces.at(TriangleIndex(t), Vec2::splat(0.2)).map(|(p, _)| world.emitters.tree.group_of(p));
     let (ceiling, screen) = (group(0).expect("it emits"), group(1).expect("it emits"));

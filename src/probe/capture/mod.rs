@@ -4,25 +4,33 @@
 //! [`Surfel`] — enough to compute its outgoing radiance again and again as bounces are added — and of every texel the
 //! emitted radiance and the distance. Traced once; a bounce costs queries only.
 
+mod backs;
+mod captured;
+mod cube;
 mod rays;
 pub mod surfel;
+#[cfg(test)]
+mod tests;
 
-use glam::{DVec3, Vec3, Vec3A};
+use std::f32::consts::TAU;
+
+use glam::{DVec3, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
-use self::rays::{Layout, TexelRay};
-pub use self::rays::{OctahedralRays, Rays};
+pub use self::backs::{BackRadiance, Backs};
+pub use self::captured::{ProbeCapture, Seen};
+pub use self::cube::Resampling;
+pub use self::rays::{CubeRays, FibonacciRays, OctahedralRays, Rays};
+use self::rays::{Pattern, TexelRay};
 use self::surfel::{PackedNormal, Surfel};
 use crate::light::World;
 use crate::light::emitters::receiver::Receiver;
 use crate::light::lambert::reflected_radiance;
 use crate::light::path::PathSettings;
-use crate::light::sampled::RayCount;
 use crate::light::surface::SurfacePoint;
 use crate::math::blocks::{BLOCK, Block};
 use crate::math::random::{KroneckerSequence, Purpose, Random};
 use crate::math::statistics::Moments;
-use crate::scene::light::LIGHT_MAX;
 use crate::trace::Ray;
 
 /// How the light of emissive surfaces and the sky reaches the surfaces that probes see.
@@ -55,6 +63,7 @@ pub struct CaptureSettings {
     pub emitter_samples: u32,
     /// Emitter samples from every probe centre (with `emission: sampled`).
     pub probe_emitter_samples: u32,
+    pub backs: Backs,
 }
 
 impl Default for CaptureSettings {
@@ -64,6 +73,7 @@ impl Default for CaptureSettings {
             emission: EmissionTransport::Sampled,
             emitter_samples: 4,
             probe_emitter_samples: 64,
+            backs: Backs::default(),
         }
     }
 }
@@ -81,31 +91,8 @@ impl CaptureSettings {
         rule("capture.emitter_samples", emitter.to_string(), (1..=65_536).contains(&emitter), "use 1 to 65536");
         let probe = self.probe_emitter_samples;
         rule("capture.probe_emitter_samples", probe.to_string(), probe <= 1 << 20, "use 0 to 1048576");
+        self.backs.check(rule);
     }
-}
-
-/// One probe's G-buffer.
-#[derive(Debug, Clone, Default)]
-pub struct ProbeCapture {
-    /// Number of texels.
-    pub texels: usize,
-    pub surfels: Vec<Surfel>,
-    /// Geometric normals of the surfels, towards the probe; empty where no one asks for them.
-    pub geometric: Vec<PackedNormal>,
-    /// Texels in which surfaces or the sky emit, with the radiance, weighted against `emitter_samples`, W·m⁻²·sr⁻¹; a
-    /// texel may come more than once.
-    pub emitted: Vec<(u32, Vec3)>,
-    /// Directions towards sampled emitters, each with radiance ÷ density, W·m⁻².
-    pub emitter_samples: Vec<(Vec3, Vec3)>,
-    /// Per texel: distances, clamped, metres; empty where no one asks for them.
-    pub distances: Vec<Moments>,
-    pub rays: RayCount,
-    /// Hits outside the hull of the probes.
-    pub hits_outside_volume: u64,
-    /// Non-finite values found and replaced by zero.
-    pub non_finite: u64,
-    /// Hits whose irradiance reaches [`LIGHT_MAX`], and is clamped to it.
-    pub light_clamped: u64,
 }
 
 /// What capturing needs besides the probe.
@@ -117,7 +104,17 @@ pub struct Capture<'w, 's> {
     pub hit_light: HitLight,
     /// Whether geometric normals of hits are kept.
     pub keeps_geometric: bool,
+    /// Whether normals and distances of the surfaces are asked for.
+    pub sees: bool,
+    /// Of [`Rays::resampling`].
+    pub resampling: Option<&'w Resampling>,
     pub seed: u64,
+}
+
+/// A frame's own rays: everything turned, and random numbers of its own.
+struct Turn {
+    rotation: Option<Quat>,
+    stream: u64,
 }
 
 impl Capture<'_, '_> {
@@ -144,7 +141,7 @@ impl Capture<'_, '_> {
         let receiver = Receiver::in_space(position);
         let mut random = Random::new(self.seed, Purpose::Places, index as u64, 1);
         let emitters = &self.world.emitters;
-        let shares = self.world.learn(&[receiver], |group| emitters.is_found_by_rays(group), &mut random);
+        let (shares, ..) = self.world.learn(&[receiver], |group| emitters.is_found_by_rays(group), &mut random);
         if shares.cosine >= 1.0 {
             return None;
         }
@@ -159,24 +156,45 @@ impl Capture<'_, '_> {
 
     /// Captures the probe at `position`. Depends on nothing but the arguments and `self`.
     pub fn probe(&self, index: usize, position: Vec3, contains: impl Fn(Vec3) -> bool) -> ProbeCapture {
-        let (texels, count) = (self.settings.rays.texels(), self.settings.rays.count());
+        self.resampled(self.cast(index, position, contains, &Turn { rotation: None, stream: 0 }))
+    }
+
+    /// Captures the probe in one of many frames, its rays turned by [`frame_rotation`].
+    pub fn frame(&self, index: usize, position: Vec3, contains: impl Fn(Vec3) -> bool, frame: u32) -> ProbeCapture {
+        let turn = Turn { rotation: Some(frame_rotation(self.seed, frame)), stream: 1 + u64::from(frame) };
+        self.resampled(self.cast(index, position, contains, &turn))
+    }
+
+    fn resampled(&self, capture: ProbeCapture) -> ProbeCapture {
+        match self.resampling {
+            Some(resampling) => capture.resampled(resampling),
+            None => capture,
+        }
+    }
+
+    fn cast(&self, index: usize, position: Vec3, contains: impl Fn(Vec3) -> bool, turn: &Turn) -> ProbeCapture {
+        let layout = self.settings.rays.pattern();
+        let (texels, count) = (layout.texels(), self.settings.rays.count());
         let (surface_samples, centre) = (self.surface_samples(), self.centre(index, position));
         let centre = centre.as_ref();
         let world = self.world;
         let mut out = ProbeCapture {
             texels,
             distances: vec![Moments::default(); if self.distance_clamp_m.is_some() { texels } else { 0 }],
+            seen: vec![Seen::default(); if self.sees { texels } else { 0 }],
             surfels: Vec::with_capacity(if self.hit_light == HitLight::None { 0 } else { count }),
             ..Default::default()
         };
-        let layout = self.settings.rays.layout();
-        let mut random = Random::new(self.seed, Purpose::Capture, index as u64, 0);
+        let mut random = Random::new(self.seed, Purpose::Capture, index as u64, turn.stream);
         // A row of texels at a time, in short loops whose turns do not wait for one another: hits are scattered over
         // memory, and one long loop would wait for each in its turn.
         let (mut rays, mut hits, mut lit) = (Vec::new(), Vec::new(), Vec::new());
         for row in 0..layout.rows() {
             rays.clear();
             layout.rays(row, &mut random, &mut rays);
+            if let Some(rotation) = turn.rotation {
+                rays.iter_mut().for_each(|ray| ray.direction = (rotation * ray.direction).normalize());
+            }
             hits.clear();
             hits.extend(rays.iter().map(|r| world.tracer.closest(Ray::new(position, r.direction, random.bits()))));
             lit.clear();
@@ -188,7 +206,7 @@ impl Capture<'_, '_> {
                         self.meet_surface(ray, &surface, centre, &mut out);
                         out.hits_outside_volume += u64::from(!contains(surface.position));
                         // What reflects nothing no bounce will ever ask for.
-                        if surface.albedo != Vec3::ZERO {
+                        if surface.albedo != Vec3::ZERO && !self.leaves_out(&surface) {
                             lit.push((*ray, surface));
                         }
                     }
@@ -229,11 +247,24 @@ impl Capture<'_, '_> {
         }
     }
 
+    fn leaves_out(&self, surface: &SurfacePoint) -> bool {
+        self.settings.backs.are_left_out() && surface.is_back()
+    }
+
     /// Distance and emission of what a capture ray hits.
     #[inline]
     fn meet_surface(&self, ray: &TexelRay, surface: &SurfacePoint, centre: Option<&Centre>, out: &mut ProbeCapture) {
         if let Some(clamp) = self.distance_clamp_m {
-            out.distances[ray.texel as usize].add(f64::from(surface.hit.t.min(clamp)), f64::from(ray.share));
+            let factor = if surface.is_back() { self.settings.backs.distance_factor } else { 1.0 };
+            let distance = (surface.hit.t * factor).min(clamp);
+            out.distances[ray.texel as usize].add(f64::from(distance), f64::from(ray.share));
+        }
+        if self.sees {
+            out.seen[ray.texel as usize].add(surface.shading_normal, surface.hit.t, ray.share);
+        }
+        if self.leaves_out(surface) {
+            out.backs.push(ray.texel);
+            return;
         }
         if surface.emission != Vec3::ZERO {
             let emitters = &self.world.emitters;
@@ -308,7 +339,7 @@ impl Capture<'_, '_> {
     }
 
     /// Draws emitters from the probe's centre.
-    fn sample_emitters(&self, index: usize, centre: &Centre, layout: &Layout, out: &mut ProbeCapture) {
+    fn sample_emitters(&self, index: usize, centre: &Centre, layout: &Pattern, out: &mut ProbeCapture) {
         let world = self.world;
         let Centre { receiver, draws } = centre;
         let mut random = Random::new(self.seed, Purpose::ProbeEmission, index as u64, 0);
@@ -326,6 +357,14 @@ impl Capture<'_, '_> {
             }
         }
     }
+}
+
+/// The random rotation of a frame's rays, the same for all probes. Uniform (Shoemake 1992).
+pub fn frame_rotation(seed: u64, frame: u32) -> Quat {
+    let mut random = Random::new(seed, Purpose::FrameRotation, u64::from(frame), 0);
+    let (u, a, b) = (random.uniform(), TAU * random.uniform(), TAU * random.uniform());
+    let (r, s) = ((1.0 - u).sqrt(), u.sqrt());
+    Quat::from_xyzw(r * a.sin(), r * a.cos(), s * b.sin(), s * b.cos())
 }
 
 /// A probe's centre, from which emitters are sampled.
@@ -346,30 +385,4 @@ struct Draws {
 /// its direction, sr⁻¹ (balance heuristic).
 fn gathered_share(ray: &TexelRay, expected: f32) -> f32 {
     ray.density / (ray.density + expected)
-}
-
-impl ProbeCapture {
-    /// Irradiance that is at most [`LIGHT_MAX`]; counted where it reaches that.
-    fn bounded(&mut self, irradiance: Vec3) -> Vec3 {
-        let is_clamped = irradiance.max_element() >= LIGHT_MAX;
-        self.light_clamped += u64::from(is_clamped);
-        if is_clamped { irradiance.min(Vec3::splat(LIGHT_MAX)) } else { irradiance }
-    }
-
-    /// Memory that it takes.
-    pub fn bytes(&self) -> u64 {
-        (self.surfels.capacity() * size_of::<Surfel>()
-            + self.geometric.capacity() * size_of::<PackedNormal>()
-            + self.emitted.capacity() * size_of::<(u32, Vec3)>()
-            + self.emitter_samples.capacity() * size_of::<(Vec3, Vec3)>()
-            + self.distances.capacity() * size_of::<Moments>()
-            + size_of::<ProbeCapture>()) as u64
-    }
-
-    /// Emitted radiance in every texel.
-    pub fn emitted_radiance(&self) -> Vec<Vec3A> {
-        let mut radiance = vec![Vec3A::ZERO; self.texels];
-        self.emitted.iter().for_each(|&(texel, emitted)| radiance[texel as usize] += Vec3A::from(emitted));
-        radiance
-    }
 }

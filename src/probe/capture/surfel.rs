@@ -87,4 +87,10 @@ impl Surfel {
         let [r, g, b] = self.albedo.map(f32::from);
         Vec3::new(r, g, b) * (1.0 / ALBEDO_SCALE)
     }
+
+    /// The same surface in another texel, with the albedo and the direct radiance of that.
+    pub fn in_texel(&self, texel: u32, albedo: Vec3, direct_radiance: Vec3) -> Surfel {
+        let scaled = albedo * ALBEDO_SCALE + dither(texel);
+        Surfel { texel, direct_radiance, albedo: [scaled.x as u16, scaled.y as u16, scaled.z as u16], ..*self }
+    }
 }

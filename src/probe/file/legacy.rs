@@ -5,7 +5,7 @@ use ron::extensions::Extensions;
 use serde::Deserialize;
 
 use super::record::{LightRecord, QUERY_VERSION, QueryRecord};
-use crate::probe::query::{Blend, DirectionWeight, LookUp, QuerySettings, VisibilityTest, WeightNormal};
+use crate::probe::query::{BiasSpacing, Blend, DirectionWeight, LookUp, QuerySettings, VisibilityTest, WeightNormal};
 use crate::probe::store::surface::TableTest;
 use crate::scene::Unassigned;
 
@@ -148,6 +148,9 @@ pub fn query(config: &str) -> Result<QueryRecord, String> {
             normal_bias: bias(q.normal_bias),
             view_bias: bias(q.view_bias),
             biased_cell: false,
+            bias_spacing: BiasSpacing::Largest,
+            distance_bias: 0.0,
+            blank_below: 0.0,
             look_up: LookUp::Normal,
         },
         moved: old.placement.relocate,

@@ -20,6 +20,8 @@ pub use self::record::{GridKind, GridRecord, LightRecord, QUERY_VERSION, QueryRe
 use super::container::{Container, EncodingLosses, FileError};
 use super::lattice::tree::Tree;
 use super::lattice::{Grid, ProbeState};
+use super::store::layout::LayoutSettings;
+use super::store::radiance::Radiance;
 use super::store::volume::Volume;
 use super::store::{Irradiance, Occlusion};
 
@@ -28,6 +30,9 @@ const GRID_INDEX: &str = "grid_index";
 
 /// Value of the metadata key `format`.
 pub const FORMAT: &str = "lightprobe/1";
+
+/// The metadata key that says how a probe's bytes are counted.
+const LAYOUT_KEY: &str = "layout";
 
 /// What a volume was made from and how it is asked.
 #[derive(Debug, Clone, Copy)]
@@ -73,6 +78,11 @@ pub fn encode(volume: &Volume, provenance: &Provenance) -> (Container, EncodingL
     container.put_bytes("state", Dtype::U8, &[probes], volume.states.iter().map(|&s| s as u8).collect());
     volume.irradiance.write(&mut container, &mut losses);
     volume.occlusion.write(&mut container, &mut losses);
+    volume.radiance.write(&mut container, &mut losses);
+    // Files of the layout that is ours do without.
+    if volume.layout != LayoutSettings::default() {
+        container.put_json(LAYOUT_KEY, &volume.layout);
+    }
     container.put_json(
         "grid",
         &GridRecord {
@@ -142,6 +152,11 @@ fn decode(container: &Container, file_bytes: u64) -> Result<ProbeFile, String> {
     let volume_in_grid = Volume {
         irradiance: Irradiance::read(container, probes, record.border)?,
         occlusion: Occlusion::read(container, &grid, record.border)?,
+        radiance: Radiance::read(container, probes, record.border)?,
+        layout: match container.metadata.contains_key(LAYOUT_KEY) {
+            true => container.json(LAYOUT_KEY)?,
+            false => LayoutSettings::default(),
+        },
         grid,
         states,
         positions,
@@ -201,7 +216,8 @@ impl ProbeFile {
     /// Bytes per probe of what the plan keeps, in the layout that shading uses.
     pub fn runtime_bytes(&self) -> f64 {
         let all = self.volume_in_grid.runtime_bytes(self.query.moved);
-        let left_out = self.volume_in_grid.occlusion.runtime_bytes(self.volume_in_grid.states.len());
+        let Volume { occlusion, states, layout, .. } = &self.volume_in_grid;
+        let left_out = occlusion.runtime_bytes(states.len(), layout);
         if self.plans_visibility() { all } else { all - left_out }
     }
 

@@ -40,7 +40,8 @@ pub struct SceneRecord {
 }
 
 /// Version of the metadata key `query` that this program writes. A change of what a look-up does raises it.
-/// 2 added `light.unassigned`; 3 `weights.weight_normal` and `weights.look_up`.
+/// 2 added `light.unassigned`; 3 added to `weights` `weight_normal`, `look_up`, `bias_spacing`, `distance_bias` and
+/// `blank_below`.
 pub const QUERY_VERSION: u32 = 3;
 
 /// The metadata key `query`: all that a look-up and the shading around it need beside the tensors.

@@ -21,6 +21,8 @@ fn volume() -> Volume {
         positions: grid.probes().map(|p| grid.grid_point(p) + 0.25).collect(),
         irradiance,
         occlusion: Occlusion::Moments(OctahedralMaps::new(4, 2, 1, Vec2::new(1.5, 0.5))),
+        radiance: Default::default(),
+        layout: Default::default(),
         grid,
     }
 }

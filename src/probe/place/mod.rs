@@ -2,6 +2,7 @@
 //!
 //! Probes that no surface can ever ask, and those inside geometry, are not worth baking.
 
+mod ddgi;
 pub mod need;
 pub mod overlap;
 mod placement;
@@ -13,6 +14,7 @@ pub mod survey;
 #[cfg(test)]
 mod tests;
 
+pub use self::ddgi::DdgiSettings;
 pub use self::placement::{Placement, PlacementTask};
 pub use self::settings::{PlacementRule, PlacementSettings, SettleSettings, SurveySettings};
 pub use self::settle::Settler;

@@ -6,6 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::ddgi::DdgiSettings;
 use crate::probe::lattice::Refine;
 
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -27,6 +28,8 @@ pub enum PlacementRule {
     GridPoints,
     /// It moves into the open, and to surfaces that see no probe.
     Settle(SettleSettings),
+    /// It moves and is classified as Majercik et al. 2021 do, see [`super::ddgi`].
+    Ddgi(DdgiSettings),
 }
 
 impl Default for PlacementRule {
@@ -41,6 +44,20 @@ impl PlacementRule {
         match self {
             PlacementRule::GridPoints => false,
             PlacementRule::Settle(settings) => settings.relocate,
+            PlacementRule::Ddgi(settings) => settings.relocate,
+        }
+    }
+
+    /// Whether it tells by itself which probes count, whatever surfaces are near.
+    pub fn classifies(&self) -> bool {
+        matches!(self, PlacementRule::Ddgi(settings) if settings.classify)
+    }
+
+    /// Rays of a probe's own that it needs in every frame, and that so bring no light.
+    pub fn reserved_rays(&self) -> usize {
+        match self {
+            PlacementRule::Ddgi(settings) if settings.relocate || settings.classify => settings.rays,
+            _ => 0,
         }
     }
 
@@ -49,6 +66,7 @@ impl PlacementRule {
         match self {
             PlacementRule::GridPoints => {}
             PlacementRule::Settle(settings) => settings.check(rule),
+            PlacementRule::Ddgi(settings) => settings.check(rule),
         }
     }
 }

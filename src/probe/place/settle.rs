@@ -3,13 +3,14 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::ddgi::{self, Relocated};
 use super::placement::{Placement, PlacementTask};
 use super::sampled::sampled_probes;
 use super::settings::{PlacementRule, SettleSettings};
 use crate::light::World;
 use crate::light::contact::Contacts;
 use crate::math::fibonacci;
-use crate::probe::lattice::{Grid, ProbeState};
+use crate::probe::lattice::{Grid, ProbeIndex, ProbeState};
 use crate::trace::Ray;
 
 /// What the rays around a position meet.
@@ -50,12 +51,17 @@ pub fn settle_all(world: &World, task: &PlacementTask) -> Placement {
     let of_probe = |probe: usize| -> Settled {
         let position = grid_points[probe];
         let viewpoint = contacts.viewpoint(probe, position);
-        if !sampled[probe] && !settings.keep_unsampled {
+        if !sampled[probe] && !settings.keep_unsampled && !settings.rule.classifies() {
             return Settled { state: ProbeState::NeverSampled, position, rays: 0, moved: false };
         }
         match &settings.rule {
             PlacementRule::Settle(rule) => Settler { world, grid, settings: rule }.settle(position, viewpoint),
             PlacementRule::GridPoints => Settled { state: ProbeState::Active, position, rays: 0, moved: false },
+            PlacementRule::Ddgi(rule) => {
+                let cell = grid.spacing() * grid.width(ProbeIndex(probe as u32)) as f32;
+                let Relocated { state, position, moved, rays } = ddgi::place(world, cell, rule, position);
+                Settled { state, position, rays, moved }
+            }
         }
     };
     let found: Vec<Settled> = (0..grid.probe_count()).into_par_iter().map(of_probe).collect();

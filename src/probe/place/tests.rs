@@ -190,3 +190,60 @@ fn memory_is_estimated_from_above() {
     // At least what the table's own entries took on the way, and no wild guess.
     assert!(estimate > table.bytes() && estimate < 1000 * table.bytes(), "{estimate} for {}", table.bytes());
 }
+
+/// Relocation and classification judged by rays of the test's own.
+#[test]
+fn ddgi_leaves_walls_and_retires_what_stays_inside() {
+    let scene = scene("cornell");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let grid = grid(&scene, 0.25);
+    let rule = DdgiSettings::default();
+    let settings = PlacementSettings { rule: PlacementRule::Ddgi(rule.clone()), ..Default::default() };
+    let still = DdgiSettings { relocate: false, ..rule.clone() };
+    let still = PlacementSettings { rule: PlacementRule::Ddgi(still), ..Default::default() };
+    let (moved, still) = (placed(&world, &grid, &settings), placed(&world, &grid, &still));
+    let is_inside = |position: Vec3| {
+        let ray = |i| Ray::new(position, crate::math::fibonacci::direction(i, rule.rays), i as u32);
+        let backs = (0..rule.rays).filter_map(|i| world.surface(ray(i))).filter(|s| s.is_back()).count();
+        // A quarter of 32.
+        backs > 8
+    };
+    let (mut freed, mut retired) = (0, 0);
+    for probe in grid.probes() {
+        let p = probe.0 as usize;
+        let (from, to) = (grid.grid_point(probe), moved.positions[p]);
+        assert_eq!(still.positions[p], from);
+        // Rounding of a difference of positions beside the bound.
+        assert!(
+            ((to - from) / grid.spacing()).length() < rule.max_offset + 1e-5,
+            "probe {p} moved from {from} to {to}"
+        );
+        for (placement, at) in [(&moved, to), (&still, from)] {
+            match placement.states[p] {
+                ProbeState::Active => assert!(!is_inside(at), "probe {p} is active inside something, at {at}"),
+                state => assert_eq!(state, ProbeState::NeverSampled),
+            }
+        }
+        freed += usize::from(is_inside(from) && moved.states[p] == ProbeState::Active);
+        retired += usize::from(is_inside(to) && moved.states[p] == ProbeState::NeverSampled);
+    }
+    // The blocks hold some that come free and some that do not; the outermost lie behind the walls.
+    assert!(freed > 0 && retired > 0, "{freed} came free, {retired} stayed inside");
+    assert!(moved.relocated > 0 && still.relocated == 0);
+}
+
+/// A probe in the open with nothing within one spacing is not asked for.
+#[test]
+fn ddgi_retires_probes_far_from_everything() {
+    let scene = scene("furnace");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let middle = scene.mesh.bounds().map(|(low, high)| 0.5 * (low + high)).unwrap();
+    let active = |spacing: f32| {
+        let grid = Grid::from_parts(middle.as_dvec3(), Vec3::splat(spacing), glam::UVec3::ONE).unwrap();
+        let (grid, _) = grid.relative_to(glam::DVec3::ZERO);
+        let settings = PlacementSettings { rule: PlacementRule::Ddgi(DdgiSettings::default()), ..Default::default() };
+        placed(&world, &grid, &settings).count(ProbeState::Active) == 1
+    };
+    // The walls of the room are 1 m away.
+    assert!(active(1.2) && !active(0.5));
+}

@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 use super::point::QueryPoint;
 use crate::probe::lattice::grid::{Cell, Grid, ProbeIndex};
 use crate::probe::store::map::OctahedralMaps;
-use crate::probe::store::moments::chebyshev;
+use crate::probe::store::moments::chebyshev_shortened;
 use crate::probe::store::surface::{Seen, SurfaceVisibility, TableTest};
 use crate::probe::store::tiles::{Tiles, box_sides};
 
@@ -39,6 +39,8 @@ pub struct MomentsTest<'v> {
     pub positions: &'v [Vec3],
     pub power: f32,
     pub floor: f32,
+    /// By how much distances count as shorter, metres.
+    pub shorter: f32,
 }
 
 impl CornerTest for MomentsTest<'_> {
@@ -50,7 +52,8 @@ impl CornerTest for MomentsTest<'_> {
     #[inline]
     fn factor(&self, probe: ProbeIndex, biased: Vec3) -> f32 {
         let probe = probe.0 as usize;
-        chebyshev(self.maps, probe, biased - self.positions[probe]).powf(self.power).max(self.floor)
+        let from_probe = biased - self.positions[probe];
+        chebyshev_shortened(self.maps, probe, from_probe, self.shorter).powf(self.power).max(self.floor)
     }
 }
 
@@ -79,6 +82,8 @@ pub struct TilesTest<'v> {
     pub positions: &'v [Vec3],
     pub power: f32,
     pub floor: f32,
+    /// By how much distances count as shorter, metres.
+    pub shorter: f32,
 }
 
 impl CornerTest for TilesTest<'_> {
@@ -91,7 +96,7 @@ impl CornerTest for TilesTest<'_> {
     fn factor(&self, probe: ProbeIndex, biased: Vec3) -> f32 {
         let p = probe.0 as usize;
         let (sides, steepness) = (box_sides(self.grid, probe), self.grid.width(probe) as f32);
-        let visibility = self.tiles.visibility(p, biased - self.positions[p], sides, steepness);
+        let visibility = self.tiles.visibility(p, biased - self.positions[p], sides, steepness, self.shorter);
         visibility.powf(self.power).max(self.floor)
     }
 }

@@ -35,8 +35,9 @@ impl<'v> Query<'v> {
             Visibility::Stored => match self.settings.test {
                 VisibilityTest::None => None,
                 VisibilityTest::Chebyshev { power, floor } => {
-                    let tiles = |tiles| Test::Tiles(TilesTest { tiles, grid, positions, power, floor });
-                    let moments = |maps| Test::Moments(MomentsTest { maps, positions, power, floor });
+                    let shorter = self.settings.distance_bias * self.settings.spacing(grid);
+                    let tiles = |tiles| Test::Tiles(TilesTest { tiles, grid, positions, power, floor, shorter });
+                    let moments = |maps| Test::Moments(MomentsTest { maps, positions, power, floor, shorter });
                     occlusion.moments().map(moments).or_else(|| occlusion.tiles().map(tiles))
                 }
                 VisibilityTest::Table(test) => {
@@ -55,7 +56,7 @@ impl<'v> Query<'v> {
             return point.position;
         }
         let bias = self.weight_normal(point) * self.settings.normal_bias + point.view * self.settings.view_bias;
-        point.position + bias * self.volume.grid.spacing_max()
+        point.position + bias * self.settings.spacing(&self.volume.grid)
     }
 
     /// The normal that weights and bias take.
@@ -122,6 +123,9 @@ impl<'v> Query<'v> {
             }
             out.weights[i] = weight * trilinear[i];
         }
+        if settings.blank_below > 0.0 && out.weights.iter().all(|w| *w < settings.blank_below) {
+            out.weights = [0.0; 8];
+        }
         out
     }
 
@@ -167,6 +171,12 @@ impl<'v> Query<'v> {
         // A probe that stands in the target knows no better direction.
         oct_from_direction(target.try_normalize().unwrap_or(normal))
     }
+}
+
+/// Trilinear weights of the eight corners; they sum to 1.
+#[inline]
+pub fn trilinear(fraction: Vec3) -> [f32; 8] {
+    floored_trilinear(fraction, 0.0)
 }
 
 /// Trilinear weights of the eight corners, no axis below `floor`; without a floor they sum to 1.

@@ -4,7 +4,7 @@
 //!
 //! 1. the cell and the trilinear weights, from P′ (from P where `biased_cell` is off);
 //! 2. for each of its eight probes the direction weight, from P, times the visibility test, from P′;
-//! 3. the floor, the crush and the trilinear weight;
+//! 3. the floor, the crush and the trilinear weight; nothing where all eight are below `blank_below`;
 //! 4. the weighted mean of the probes' irradiance around the normal, or towards where the light comes from.
 
 mod corner_test;
@@ -14,6 +14,6 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
-pub use self::look_up::Query;
+pub use self::look_up::{Query, trilinear};
 pub use self::point::{CornerWeights, QueryPoint, Visibility};
-pub use self::settings::{Blend, DirectionWeight, LookUp, QuerySettings, VisibilityTest, WeightNormal};
+pub use self::settings::{BiasSpacing, Blend, DirectionWeight, LookUp, QuerySettings, VisibilityTest, WeightNormal};

@@ -3,6 +3,7 @@
 use glam::Vec3A;
 use serde::{Deserialize, Serialize};
 
+use crate::probe::lattice::Grid;
 use crate::probe::store::OcclusionStore;
 use crate::probe::store::surface::TableTest;
 
@@ -28,8 +29,22 @@ pub struct QuerySettings {
     /// Whether the shifted point also chooses the cell and the trilinear weights; else only the visibility test sees the
     /// shift.
     pub biased_cell: bool,
+    /// What biases are relative to where spacings differ.
+    pub bias_spacing: BiasSpacing,
+    /// Distances to probes count as shorter by this in the visibility test, in spacings.
+    pub distance_bias: f32,
+    /// Where every weight is below this, there is no light.
+    pub blank_below: f32,
     /// The direction that probes' irradiance is looked up around.
     pub look_up: LookUp,
+}
+
+/// The spacing that lengths are relative to where the grid's differ along its axes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BiasSpacing {
+    Largest,
+    Smallest,
 }
 
 impl Default for QuerySettings {
@@ -45,6 +60,9 @@ impl Default for QuerySettings {
             normal_bias: 0.0,
             view_bias: 0.0,
             biased_cell: true,
+            bias_spacing: BiasSpacing::Largest,
+            distance_bias: 0.0,
+            blank_below: 0.0,
             look_up: LookUp::Normal,
         }
     }
@@ -117,6 +135,15 @@ impl QuerySettings {
         self.normal_bias.abs() + self.view_bias.abs()
     }
 
+    /// The spacing that biases are relative to, metres.
+    #[inline]
+    pub fn spacing(&self, grid: &Grid) -> f32 {
+        match self.bias_spacing {
+            BiasSpacing::Largest => grid.spacing_max(),
+            BiasSpacing::Smallest => grid.spacing_min(),
+        }
+    }
+
     fn weights_need_normal(&self) -> bool {
         self.direction != DirectionWeight::Uniform || self.normal_bias != 0.0
     }
@@ -161,6 +188,8 @@ impl QuerySettings {
         unit("query.crush_below", self.crush_below);
         unit("query.normal_bias", self.normal_bias);
         unit("query.view_bias", self.view_bias);
+        unit("query.distance_bias", self.distance_bias);
+        unit("query.blank_below", self.blank_below);
         match self.direction {
             DirectionWeight::Uniform => {}
             DirectionWeight::Cosine { floor } => unit("query.direction.cosine.floor", floor),

@@ -112,6 +112,14 @@ impl Irradiance {
         }
     }
 
+    /// The domain in which values are stored, and mixed over time.
+    pub fn curve(&self) -> IrradianceCurve {
+        match self {
+            Irradiance::Maps { curve, .. } => *curve,
+            Irradiance::Sh9(_) => IrradianceCurve::Linear,
+        }
+    }
+
     /// Linear unknowns of one probe.
     pub fn unknowns(&self) -> usize {
         match self {

@@ -8,8 +8,9 @@ mod harmonics;
 
 use std::f32::consts::PI;
 
-use glam::{Vec2, Vec3, Vec3A};
+use glam::{Quat, Vec2, Vec3, Vec3A};
 
+use super::dense::Dense;
 use crate::math::octahedral::{direction_from_oct, solid_angle_density};
 use crate::math::statistics::Moments;
 
@@ -43,10 +44,39 @@ impl Directions {
         Directions { all, per_texel: QUADRATURE * QUADRATURE }
     }
 
+    /// Of rays that each stand for as much of the sphere as any other, unit.
+    pub fn even(rays: Vec<Vec3>) -> Directions {
+        let share = 4.0 * PI / rays.len().max(1) as f32;
+        Directions::lone(rays.into_iter().map(|direction| (direction, share)).collect())
+    }
+
+    /// Of rays that are a texel each, unit, with the solid angles that they stand for, sr.
+    pub fn lone(rays: Vec<(Vec3, f32)>) -> Directions {
+        Directions { all: rays, per_texel: 1 }
+    }
+
+    /// The same turned.
+    pub fn turned(mut self, rotation: Quat) -> Directions {
+        self.all.iter_mut().for_each(|(direction, _)| *direction = rotation * *direction);
+        self
+    }
+
     pub fn texels(&self) -> usize {
         self.all.len() / self.per_texel
     }
+
+    /// Of every texel the mean direction, unit, and the solid angle, sr.
+    pub fn texel_means(&self) -> Vec<(Vec3, f32)> {
+        let mean = |texel: &[(Vec3, f32)]| {
+            let sum: Vec3 = texel.iter().map(|(d, w)| *d * *w).sum();
+            (sum.normalize_or(Vec3::Z), texel.iter().map(|(_, w)| w).sum())
+        };
+        self.all.chunks(self.per_texel).map(mean).collect()
+    }
 }
+
+/// Kernels whose weights would take more than this compute them at every use instead, see [`Dense`].
+const SPARSE_BYTES: f64 = (256u64 << 20) as f64;
 
 /// A sparse matrix from capture texels to the texels of a stored map; each row sums to 1.
 #[derive(Debug, Clone)]
@@ -54,9 +84,22 @@ pub struct Kernel {
     /// `row_start[o]..row_start[o + 1]` are the entries of output texel `o`.
     row_start: Vec<usize>,
     entries: Vec<(u32, f32)>,
+    /// In place of all that where it would be too large.
+    dense: Option<Dense>,
 }
 
 impl Kernel {
+    /// The matrix of these rows, each a list of columns and weights above 0.
+    pub fn of_rows(rows: impl Iterator<Item = Vec<(u32, f32)>>) -> Kernel {
+        let mut kernel = Kernel { row_start: vec![0], entries: Vec::new(), dense: None };
+        for row in rows {
+            let sum: f64 = row.iter().map(|(_, w)| f64::from(*w)).sum();
+            kernel.entries.extend(row.into_iter().map(|(t, w)| (t, (f64::from(w) / sum) as f32)));
+            kernel.row_start.push(kernel.entries.len());
+        }
+        kernel
+    }
+
     /// Cosine-weighted means around each of `axes`, unit: irradiance ÷ π.
     pub fn cosine(captured: &Directions, axes: &[Vec3]) -> Kernel {
         Kernel::lobe(captured, axes, 1.0)
@@ -64,8 +107,13 @@ impl Kernel {
 
     /// Means under max(0, ω·d)^`exponent` around each of `axes`, unit.
     pub fn lobe(captured: &Directions, axes: &[Vec3], exponent: f32) -> Kernel {
-        let entries = (Kernel::entries(captured.texels(), axes.len(), exponent) * 1.02) as usize;
-        let mut kernel = Kernel { row_start: vec![0], entries: Vec::with_capacity(entries) };
+        let entries = Kernel::entries(captured.texels(), axes.len(), exponent);
+        if Kernel::is_dense(entries) {
+            let dense = Dense::new(&captured.texel_means(), axes, exponent, NEGLIGIBLE);
+            return Kernel { row_start: vec![0], entries: Vec::new(), dense: Some(dense) };
+        }
+        let mut kernel =
+            Kernel { row_start: vec![0], entries: Vec::with_capacity((entries * 1.02) as usize), dense: None };
         for axis in axes {
             let texel = |texel: &[(Vec3, f32)]| -> f32 {
                 texel.iter().map(|(d, w)| axis.dot(*d).max(0.0).powf(exponent) * w).sum()
@@ -86,8 +134,17 @@ impl Kernel {
     /// Memory of a kernel while it is made.
     pub fn bytes(texels: usize, axes: usize, exponent: f32) -> u64 {
         let quadrature = (texels * QUADRATURE * QUADRATURE * size_of::<(Vec3, f32)>()) as u64;
+        let entries = Kernel::entries(texels, axes, exponent);
+        if Kernel::is_dense(entries) {
+            return Dense::bytes(texels, axes) + quadrature;
+        }
         // `as` saturates.
-        (Kernel::entries(texels, axes, exponent) * size_of::<(u32, f32)>() as f64) as u64 + quadrature
+        (entries * size_of::<(u32, f32)>() as f64) as u64 + quadrature
+    }
+
+    /// Whether so many weights are not kept.
+    fn is_dense(entries: f64) -> bool {
+        entries * size_of::<(u32, f32)>() as f64 > SPARSE_BYTES
     }
 
     fn push_row(&mut self, weights: &[f32]) {
@@ -99,10 +156,14 @@ impl Kernel {
     }
 
     pub fn rows(&self) -> usize {
-        self.row_start.len() - 1
+        self.dense.as_ref().map_or(self.row_start.len() - 1, Dense::rows)
     }
 
-    fn row(&self, o: usize) -> &[(u32, f32)] {
+    /// The columns of a row with their weights; of kernels that keep none, none.
+    pub fn row(&self, o: usize) -> &[(u32, f32)] {
+        if self.dense.is_some() {
+            return &[];
+        }
         &self.entries[self.row_start[o]..self.row_start[o + 1]]
     }
 
@@ -111,6 +172,9 @@ impl Kernel {
     pub fn irradiance(&self, radiance: &[Vec3A], out: &mut [Vec3A]) {
         /// Sums that run beside each other, so that no addition waits for the one before it.
         const LANES: usize = 4;
+        if let Some(dense) = &self.dense {
+            return dense.irradiance(radiance, out);
+        }
         for (o, value) in out.iter_mut().enumerate() {
             let (blocks, rest) = self.row(o).as_chunks::<LANES>();
             let mut sums = [Vec3A::ZERO; LANES];
@@ -124,8 +188,28 @@ impl Kernel {
         }
     }
 
+    /// The same without some texels, in ascending order, of which neither light nor weight counts. `None` where nothing is
+    /// left for a direction.
+    pub fn irradiance_without(&self, radiance: &[Vec3A], left_out: &[u32]) -> Option<Vec<Vec3A>> {
+        if left_out.is_empty() || self.dense.is_some() {
+            let mut out = vec![Vec3A::ZERO; self.rows()];
+            self.irradiance(radiance, &mut out);
+            return Some(out);
+        }
+        let mean = |o: usize| {
+            let counted = self.row(o).iter().filter(|(t, _)| left_out.binary_search(t).is_err());
+            let (sum, weight) =
+                counted.fold((Vec3A::ZERO, 0.0), |(sum, weight), &(t, w)| (sum + radiance[t as usize] * w, weight + w));
+            (weight > 0.0).then(|| PI * sum / weight)
+        };
+        (0..self.rows()).map(mean).collect()
+    }
+
     /// Mean and variance of distance around every output direction from those within every capture texel, metres.
     pub fn distance(&self, texels: &[Moments]) -> Vec<Moments> {
+        if let Some(dense) = &self.dense {
+            return dense.distance(texels);
+        }
         let mix = |o: usize| {
             let mut sum = Moments::default();
             for &(t, w) in self.row(o) {

@@ -3,12 +3,15 @@
 //! Irradiance and occlusion are stages: each has one enum of settings ([`IrradianceStore`], [`OcclusionStore`]) and one of
 //! data ([`Irradiance`], [`Occlusion`]), and no other file looks at their variants. [`Volume`](volume::Volume) holds both.
 
+mod dense;
 pub mod encode;
 pub mod irradiance;
 pub mod kernel;
+pub mod layout;
 pub mod map;
 pub mod moments;
 pub mod occlusion;
+pub mod radiance;
 pub mod sh;
 pub mod surface;
 #[cfg(test)]
@@ -19,7 +22,9 @@ pub mod volume;
 use serde::{Deserialize, Serialize};
 
 pub use self::irradiance::{Irradiance, IrradianceStore};
+use self::layout::LayoutSettings;
 pub use self::occlusion::{Occlusion, OcclusionStore};
+use self::radiance::{LightFieldStore, RadianceStore};
 
 /// What probes hold, and in which form.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -29,21 +34,33 @@ pub struct StoreSettings {
     pub border: usize,
     pub irradiance: IrradianceStore,
     pub occlusion: OcclusionStore,
+    pub light_field: LightFieldStore,
+    /// Texels per side of the levels of radiance for glossy surfaces, from the capture's own on, each half of the one before.
+    pub prefiltered: Vec<usize>,
+    pub layout: LayoutSettings,
+}
+
+impl StoreSettings {
+    /// What it says about radiance.
+    pub fn radiance(&self) -> RadianceStore<'_> {
+        RadianceStore {
+            light_field: self.light_field,
+            prefiltered: &self.prefiltered,
+            format: self.irradiance.format(),
+            border: self.border,
+        }
+    }
 }
 
 impl Default for StoreSettings {
     fn default() -> Self {
-        StoreSettings { border: 1, irradiance: IrradianceStore::default(), occlusion: OcclusionStore::default() }
+        StoreSettings {
+            border: 1,
+            irradiance: IrradianceStore::default(),
+            occlusion: OcclusionStore::default(),
+            light_field: LightFieldStore::None,
+            prefiltered: Vec::new(),
+            layout: LayoutSettings::default(),
+        }
     }
-}
-
-/// `state`, u8 per probe.
-const STATE_BYTES: usize = 1;
-
-/// `position`, three f32 per probe.
-const POSITION_BYTES: usize = 12;
-
-/// Bytes of a probe's state and, where probes may have been moved from their grid points, its position.
-pub fn head_bytes(moved: bool) -> usize {
-    STATE_BYTES + if moved { POSITION_BYTES } else { 0 }
 }

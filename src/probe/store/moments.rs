@@ -38,9 +38,14 @@ const TEXEL_BYTES: usize = 4;
 const SCALE_BYTES: usize = 4;
 
 impl MomentsStore {
-    /// Bytes of one probe in the layout that shading uses.
-    pub fn runtime_bytes(&self, border: usize) -> usize {
-        (self.resolution + 2 * border).pow(2) * TEXEL_BYTES + SCALE_BYTES
+    /// Bytes of one probe in the layout that shading uses; `scaled`: with a scale of its own.
+    pub fn runtime_bytes(&self, border: usize, scaled: bool) -> usize {
+        (self.resolution + 2 * border).pow(2) * TEXEL_BYTES + if scaled { SCALE_BYTES } else { 0 }
+    }
+
+    /// The filter from captured distances.
+    pub fn kernel(&self, captured: &Directions) -> Kernel {
+        Kernel::lobe(captured, &texel_directions(self.resolution), self.exponent)
     }
 }
 
@@ -53,7 +58,7 @@ pub struct MomentsBuilder {
 impl MomentsBuilder {
     pub fn new(store: &MomentsStore, captured: &Directions, probes: usize, border: usize) -> MomentsBuilder {
         MomentsBuilder {
-            kernel: Kernel::lobe(captured, &texel_directions(store.resolution), store.exponent),
+            kernel: store.kernel(captured),
             maps: OctahedralMaps::new(probes, store.resolution, border, Vec2::ZERO),
         }
     }
@@ -77,10 +82,17 @@ impl MomentsBuilder {
 /// Upper bound of the share of a probe's surroundings that are at least as far as the point: σ²/(σ² + (d − μ)²) behind the
 /// mean distance μ, 1 before it. `from_probe` leads from the probe to the point, metres.
 pub fn chebyshev(maps: &OctahedralMaps<Vec2>, probe: usize, from_probe: Vec3) -> f32 {
+    chebyshev_shortened(maps, probe, from_probe, 0.0)
+}
+
+/// The same for a point that counts as nearer by `shorter`, metres.
+#[inline]
+pub fn chebyshev_shortened(maps: &OctahedralMaps<Vec2>, probe: usize, from_probe: Vec3, shorter: f32) -> f32 {
     let distance = from_probe.length();
     if distance == 0.0 {
         return 1.0;
     }
+    let distance = distance - shorter;
     let (map, taps) = (maps.probe(probe), maps.taps(oct_from_direction(from_probe)));
     let tap = |i: usize| map[taps.offset[i] as usize];
     let mean: f32 = (0..4).map(|i| tap(i).x * taps.weight[i]).sum();

@@ -3,10 +3,12 @@
 use std::borrow::Cow;
 
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::kernel::{Directions, Kernel};
-use super::map::OctahedralMaps;
+use super::layout::LayoutSettings;
+use super::map::{OctahedralMaps, fill_with_border, interior_texel};
 use super::moments::{self, MomentsBuilder, MomentsStore};
 use super::surface::{self, MAX_VOXELS_PER_CELL, SurfaceStore, SurfaceVisibility};
 use super::tiles::{self, TileStore, Tiles, TilesBuilder, box_sides};
@@ -116,10 +118,16 @@ impl OcclusionStore {
     }
 
     /// Bytes of one probe in the layout that shading uses; `survey` is what surveying the surfaces found.
-    pub fn runtime_bytes(&self, border: usize, survey: Option<&SurfaceVisibility>, probes: usize) -> f64 {
+    pub fn runtime_bytes(
+        &self,
+        border: usize,
+        survey: Option<&SurfaceVisibility>,
+        probes: usize,
+        layout: &LayoutSettings,
+    ) -> f64 {
         match self {
             OcclusionStore::None => 0.0,
-            OcclusionStore::Moments(store) => store.runtime_bytes(border) as f64,
+            OcclusionStore::Moments(store) => store.runtime_bytes(border, layout.distance_scale) as f64,
             OcclusionStore::Tiles(store) => store.runtime_bytes(border) as f64,
             OcclusionStore::Surface(_) => survey.map_or(0, SurfaceVisibility::bytes) as f64 / probes as f64,
         }
@@ -131,6 +139,14 @@ impl OcclusionStore {
             OcclusionStore::Moments(store) => ((store.resolution + 2 * border) as u64).pow(2) * DISTANCE_TEXEL_BYTES,
             OcclusionStore::Tiles(store) => ((store.resolution + 2 * border) as u64).pow(2) * DISTANCE_TEXEL_BYTES,
             OcclusionStore::None | OcclusionStore::Surface(_) => 0,
+        }
+    }
+
+    /// The filter from distances in these directions to those that are stored; `None` where none are.
+    pub fn kernel(&self, captured: &Directions) -> Option<Kernel> {
+        match self {
+            OcclusionStore::Moments(store) => Some(store.kernel(captured)),
+            OcclusionStore::None | OcclusionStore::Tiles(_) | OcclusionStore::Surface(_) => None,
         }
     }
 
@@ -290,16 +306,57 @@ impl Occlusion {
     }
 
     /// Bytes per probe in the layout that shading uses.
-    pub fn runtime_bytes(&self, probes: usize) -> f64 {
+    pub fn runtime_bytes(&self, probes: usize, layout: &LayoutSettings) -> f64 {
         match self {
             Occlusion::None => 0.0,
             Occlusion::Moments(maps) => {
                 let store = MomentsStore { resolution: maps.resolution, ..MomentsStore::default() };
-                store.runtime_bytes(maps.border) as f64
+                store.runtime_bytes(maps.border, layout.distance_scale) as f64
             }
             Occlusion::Tiles(tiles) => tiles.store().runtime_bytes(tiles.maps.border) as f64,
             Occlusion::Surface(table) => table.bytes() as f64 / probes as f64,
         }
+    }
+
+    /// Mixes new distances into those of the probes for which there are some: what was there counts with `kept`, but
+    /// where there was nothing.
+    pub fn blend_each(&mut self, samples: &[Option<Vec<Moments>>], kept: f64) {
+        let Occlusion::Moments(maps) = self else { return };
+        let (resolution, border) = (maps.resolution, maps.border);
+        let interior = interior_texel(resolution, border);
+        let per_probe = maps.texels_per_probe();
+        maps.texels.par_chunks_mut(per_probe).zip(samples).for_each(|(map, samples)| {
+            let Some(samples) = samples.as_ref().filter(|samples| samples.len() == resolution * resolution) else {
+                return;
+            };
+            let mix = |(o, sample): (usize, &Moments)| {
+                let Vec2 { x: mean, y: deviation } = map[interior(o)];
+                let mut mixed = Moments::default();
+                mixed.add_set(sample.mean(), sample.variance(), if mean == 0.0 { 1.0 } else { 1.0 - kept });
+                if mean != 0.0 && kept > 0.0 {
+                    mixed.add_set(f64::from(mean), f64::from(deviation).powi(2), kept);
+                }
+                Vec2::new(mixed.mean() as f32, mixed.variance().sqrt() as f32)
+            };
+            let mixed: Vec<Vec2> = samples.iter().enumerate().map(mix).collect();
+            fill_with_border(&mixed, resolution, border, map);
+        });
+    }
+
+    /// Distances as they are in memory, for checkpoints; inverse of [`Self::restore`].
+    pub fn stored(&self) -> Vec<Vec3> {
+        let Occlusion::Moments(maps) = self else { return Vec::new() };
+        maps.texels.iter().map(|t| t.extend(0.0)).collect()
+    }
+
+    /// Puts back what [`Self::stored`] gave; false where it is of another volume.
+    pub fn restore(&mut self, stored: &[Vec3]) -> bool {
+        let Occlusion::Moments(maps) = self else { return stored.is_empty() };
+        let fits = stored.len() == maps.texels.len();
+        if fits {
+            maps.texels = stored.iter().map(|t| t.truncate()).collect();
+        }
+        fits
     }
 
     /// Writes its tensors; those that are there tell which variant it is.

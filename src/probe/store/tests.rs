@@ -5,6 +5,7 @@ use proptest::prelude::*;
 
 use super::encode::ColorFormat;
 use super::irradiance::{IrradianceCurve, IrradianceStore, OctahedralStore};
+use super::layout::LayoutSettings;
 use super::map::OctahedralMaps;
 use super::moments::chebyshev;
 use super::surface::{Facing, Seen, SurfaceVisibility, TableTest, key, voxel_of_key};
@@ -141,7 +142,8 @@ fn the_layout_counts_every_byte() {
     // 10² texels of 4 bytes with the border.
     assert_eq!(store.runtime_bytes(1), 400);
     assert_eq!(store.zeros(3, 1).runtime_bytes(), 400);
-    assert_eq!(super::head_bytes(true) + super::head_bytes(false), 14);
+    let layout = LayoutSettings::default();
+    assert_eq!(layout.head_bytes(true) + layout.head_bytes(false), 14);
     let table = table();
     // 3 starts of 4 bytes, 3 keys of 2, 3 masks, one pair of 8.
     assert_eq!(table.bytes(), 12 + 6 + 3 + 8);
@@ -149,7 +151,7 @@ fn the_layout_counts_every_byte() {
     let mut container = Container::default();
     occlusion.write(&mut container, &mut EncodingLosses::default());
     let written: usize = container.tensors.values().map(|t| t.bytes.len()).sum();
-    assert_eq!(occlusion.runtime_bytes(1), written as f64);
+    assert_eq!(occlusion.runtime_bytes(1, &layout), written as f64);
     assert_eq!(Occlusion::read(&container, &grid(), 1).unwrap(), occlusion);
 }
 

@@ -84,15 +84,16 @@ impl Tiles {
     }
 
     /// How far a point is seen, 0 to 1: σ²/(σ² + (s·(d − μ))²) behind the mean distance μ, 1 before it. `steepness` s is the
-    /// width of the probe's cell in the finest: what a coarse tile blurs is not to leak.
+    /// width of the probe's cell in the finest: what a coarse tile blurs is not to leak. The point counts as nearer by
+    /// `shorter`, metres.
     #[inline]
-    pub fn visibility(&self, probe: usize, from_probe: Vec3, sides: Vec3, steepness: f32) -> f32 {
+    pub fn visibility(&self, probe: usize, from_probe: Vec3, sides: Vec3, steepness: f32, shorter: f32) -> f32 {
         let distance = from_probe.length();
         if distance == 0.0 {
             return 1.0;
         }
         let Vec2 { x: mean, y: deviation } = self.distance(probe, from_probe / distance, sides);
-        let excess = steepness * (distance - mean);
+        let excess = steepness * (distance - shorter - mean);
         if excess <= 0.0 {
             return 1.0;
         }

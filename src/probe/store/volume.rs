@@ -2,7 +2,9 @@
 
 use glam::Vec3;
 
-use super::{Irradiance, Occlusion, head_bytes};
+use super::layout::LayoutSettings;
+use super::radiance::Radiance;
+use super::{Irradiance, Occlusion};
 use crate::probe::lattice::{Grid, ProbeIndex, ProbeState};
 
 #[derive(Debug, Clone, PartialEq)]
@@ -13,6 +15,9 @@ pub struct Volume {
     pub positions: Vec<Vec3>,
     pub irradiance: Irradiance,
     pub occlusion: Occlusion,
+    pub radiance: Radiance,
+    /// How its bytes are counted.
+    pub layout: LayoutSettings,
 }
 
 impl Volume {
@@ -40,7 +45,9 @@ impl Volume {
 
     /// Bytes per probe in the layout that shading uses; `moved`: whether positions are stored beside the grid's.
     pub fn runtime_bytes(&self, moved: bool) -> f64 {
-        let own = (head_bytes(moved) + self.irradiance.runtime_bytes()) as f64;
-        own + self.grid.runtime_bytes(moved) + self.occlusion.runtime_bytes(self.states.len())
+        let head = self.layout.head_bytes(moved) + self.irradiance.runtime_bytes();
+        let (field, levels) = self.radiance.runtime_bytes(self.layout.g_buffer);
+        let own = (head + field + levels) as f64 + self.grid.runtime_bytes(moved);
+        own + self.occlusion.runtime_bytes(self.states.len(), &self.layout)
     }
 }

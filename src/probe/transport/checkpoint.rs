@@ -3,6 +3,7 @@
 //!
 //! Captures are traced again on resumption — the same seed gives the same — so only the iterations are saved.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
@@ -16,6 +17,9 @@ use crate::probe::container::{Container, FileError, Tensor};
 
 /// Value of the metadata key `format`.
 const FORMAT: &str = "lightprobe-resume/3";
+
+/// What the names of a solver's own tensors begin with.
+const FIELD: &str = "field.";
 
 /// Where the checkpoint of an output lies.
 pub fn path_for(output: &Path) -> PathBuf {
@@ -35,6 +39,9 @@ pub fn write(path: &Path, identity: &str, progress: &Progress, volume: &Volume) 
         }
         let noise: Vec<[f64; 3]> = noise.into_iter().map(|n| n.to_array()).collect();
         container.metadata.insert("history".into(), serde_json::to_string(&noise).unwrap_or_default());
+    }
+    for (name, values) in &progress.fields {
+        container.tensors.insert(format!("{FIELD}{name}"), tensor(values.iter().copied()));
     }
     container.metadata.insert("format".into(), FORMAT.into());
     container.metadata.insert("identity".into(), identity.into());
@@ -66,7 +73,12 @@ pub fn read(path: &Path, identity: &str, volume: &mut Volume) -> Result<Progress
                 .ok_or_else(|| unusable("its earlier iterations are not of this grid"))?,
         ),
     };
-    Ok(Progress { solution, control, history })
+    let mut fields = BTreeMap::new();
+    for name in container.tensors.keys().filter_map(|name| name.strip_prefix(FIELD)) {
+        let values = field(&container, &format!("{FIELD}{name}"));
+        fields.insert(name.to_owned(), values.ok_or_else(|| unusable("a tensor of it is unreadable"))?);
+    }
+    Ok(Progress { solution, control, history, fields, is_partial: false })
 }
 
 fn history(container: &Container, noise: &str, unknowns: usize, group: usize) -> Option<History> {

@@ -88,6 +88,9 @@ pub fn solve<C: Captures>(
         solution.converged = residual < f64::from(settings.tolerance) || residual == 0.0;
         on_iteration(&progress, volume);
     }
+    if !volume.radiance.is_empty() {
+        operator.keep_radiance(volume, Some(&masks), true);
+    }
     let mut solution = progress.solution;
     if !operator.gathers_emission {
         let emitted = operator.add_emission(volume);

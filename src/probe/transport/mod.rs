@@ -2,16 +2,20 @@
 
 pub mod anderson;
 pub mod checkpoint;
+mod frames;
 mod in_order;
 pub mod operator;
 mod settings;
 pub mod solver;
 #[cfg(test)]
 mod tests;
+mod tracing;
 pub mod truth;
 
 use self::operator::{Captures, Operator};
-pub use self::settings::{Acceleration, BounceSettings, InOrderSettings, Transport};
+pub use self::settings::{
+    Acceleration, BounceSettings, FrameSettings, InOrderSettings, TracingFilter, TracingSettings, Transport,
+};
 use self::solver::{Progress, Solution};
 use super::Volume;
 
@@ -24,9 +28,14 @@ pub fn run<C: Captures>(
     progress: Progress,
     on_iteration: impl FnMut(&Progress, &Volume),
 ) -> Solution {
-    let solution = match transport {
+    match transport {
+        Transport::Bounces(settings) => solver::solve(operator, settings, volume, progress, on_iteration),
         Transport::InOrder(settings) => in_order::solve(operator, settings, volume, progress, on_iteration),
-        _ => solver::solve(operator, &transport.iteration(), volume, progress, on_iteration),
-    };
-    Solution { converged: solution.converged || transport.is_complete(), ..solution }
+        Transport::Paths { .. } => {
+            let solution = solver::solve(operator, &transport.iteration(), volume, progress, on_iteration);
+            Solution { converged: true, ..solution }
+        }
+        Transport::Frames(settings) => frames::solve(operator, settings, volume, progress, on_iteration),
+        Transport::Tracing(settings) => tracing::solve(operator, settings, volume, progress, on_iteration),
+    }
 }

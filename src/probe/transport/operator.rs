@@ -10,12 +10,13 @@ use std::time::Instant;
 use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
 
+use crate::light::World;
 use crate::light::lambert::reflected_radiance;
 use crate::math::color::luminance;
 use crate::math::octahedral::direction_from_oct;
 use crate::probe::Volume;
-use crate::probe::capture::ProbeCapture;
 use crate::probe::capture::surfel::Surfel;
+use crate::probe::capture::{ProbeCapture, Seen};
 use crate::probe::lattice::ProbeState;
 use crate::probe::query::{Query, QueryPoint, QuerySettings, Visibility};
 use crate::probe::store::kernel::Kernel;
@@ -24,6 +25,40 @@ use crate::probe::store::kernel::Kernel;
 pub trait Captures: Sync {
     /// Calls `visit` on one probe's capture.
     fn with<R>(&self, probe: usize, visit: impl FnOnce(&ProbeCapture) -> R) -> R;
+
+    /// A probe's capture in one of many frames, each with rays of its own. `None` where captures do not change.
+    fn frame(&self, _probe: usize, _frame: u32) -> Option<Frame> {
+        None
+    }
+
+    /// The filters from the captures of one frame to what `volume` holds; `None` where captures do not change.
+    fn filters(&self, _frame: u32, _volume: &Volume) -> Option<Filters> {
+        None
+    }
+
+    /// The scene, for transports that send rays from the captured surfaces; `None` where there is none.
+    fn scenery(&self) -> Option<Scenery<'_>> {
+        None
+    }
+}
+
+/// A frame's capture, and whether light may be learnt from it.
+pub struct Frame {
+    pub capture: ProbeCapture,
+    pub counts: bool,
+}
+
+/// Filters from the texels of a frame's captures.
+pub struct Filters {
+    pub irradiance: Kernel,
+    /// `None` where no distances are stored.
+    pub distance: Option<Kernel>,
+}
+
+/// What rays are traced in.
+pub struct Scenery<'a> {
+    pub world: &'a World<'a>,
+    pub seed: u64,
 }
 
 impl Captures for Vec<ProbeCapture> {
@@ -122,17 +157,10 @@ impl<C: Captures> Operator<'_, C> {
 
     /// One application at one active probe, with the masks of its own surfels.
     fn apply_to(&self, volume: &Volume, p: usize, masks: Option<&[u8]>) -> (Vec<Vec3A>, u64) {
-        let query = Query { volume, settings: self.query };
         self.captures.with(p, |capture| {
-            let outgoing = |(i, surfel): (usize, &Surfel)| {
-                let mut outgoing = surfel.direct_radiance;
-                if let Some(masks) = masks {
-                    let point = self.query_point(capture, i, volume.positions[p]);
-                    outgoing += self.reflected(&query, surfel, &point, masks[i]);
-                }
-                outgoing
-            };
-            self.filter(capture, capture.surfels.iter().enumerate().map(outgoing))
+            let mask = |i: usize| masks.map(|masks| masks[i]);
+            let (radiance, non_finite) = self.outgoing(volume, p, capture, mask, self.gathers_emission);
+            (self.filtered(&radiance), non_finite)
         })
     }
 
@@ -142,32 +170,67 @@ impl<C: Captures> Operator<'_, C> {
         const CHUNK: usize = 512;
         let query = Query { volume, settings: self.query };
         self.captures.with(p, |capture| {
-            let outgoing = |(i, surfel): (usize, &Surfel)| {
-                let point = self.query_point(capture, i, volume.positions[p]);
-                surfel.direct_radiance + self.reflected(&query, surfel, &point, masks.0[p][i])
-            };
-            let outgoing: Vec<Vec3> =
-                capture.surfels.par_iter().enumerate().with_min_len(CHUNK).map(outgoing).collect();
-            self.filter(capture, outgoing.into_iter())
+            let leaves = |i| self.leaves(&query, capture, i, volume.positions[p], Some(masks.0[p][i]));
+            let found: Vec<Vec3> = (0..capture.surfels.len()).into_par_iter().with_min_len(CHUNK).map(leaves).collect();
+            let (radiance, non_finite) = add_up(capture, found.into_iter(), self.gathers_emission);
+            (self.filtered(&radiance), non_finite)
         })
     }
 
-    /// A probe's irradiance from the radiance of its surfels, in their order, and how many of these were not finite.
+    /// Radiance in every texel of a capture, and how many hits' was not finite and left out. `mask` tells of a surfel what
+    /// it sees, 0 where that must be looked up, and `None` where nothing is asked of the probes.
+    pub fn outgoing(
+        &self,
+        volume: &Volume,
+        p: usize,
+        capture: &ProbeCapture,
+        mask: impl Fn(usize) -> Option<u8>,
+        emits: bool,
+    ) -> (Vec<Vec3A>, u64) {
+        let query = Query { volume, settings: self.query };
+        let leaves = |i| self.leaves(&query, capture, i, volume.positions[p], mask(i));
+        add_up(capture, (0..capture.surfels.len()).map(leaves), emits)
+    }
+
+    /// Radiance that leaves a surfel towards the probe at `position`. `mask`: the corners that it sees, 0 where that is not
+    /// known; `None` where it reflects no light of probes.
     #[inline]
-    fn filter(&self, capture: &ProbeCapture, outgoing: impl Iterator<Item = Vec3>) -> (Vec<Vec3A>, u64) {
-        let mut radiance =
-            if self.gathers_emission { capture.emitted_radiance() } else { vec![Vec3A::ZERO; capture.texels] };
-        let mut non_finite = 0;
-        for (surfel, outgoing) in capture.surfels.iter().zip(outgoing) {
-            if outgoing.is_finite() {
-                radiance[surfel.texel as usize] += Vec3A::from(outgoing);
-            } else {
-                non_finite += 1;
+    fn leaves(&self, query: &Query, capture: &ProbeCapture, i: usize, position: Vec3, mask: Option<u8>) -> Vec3 {
+        let surfel = &capture.surfels[i];
+        let visibility = match mask {
+            None => return surfel.direct_radiance,
+            Some(0) => Visibility::Stored,
+            Some(mask) => Visibility::Exact(mask),
+        };
+        let point = self.query_point(capture, i, position);
+        let weights = query.weights(&point, visibility);
+        surfel.direct_radiance + reflected_radiance(surfel.albedo(), query.blend(&weights, &point, surfel.oct()))
+    }
+
+    /// A probe's unknowns from the radiance in its texels.
+    fn filtered(&self, radiance: &[Vec3A]) -> Vec<Vec3A> {
+        let mut irradiance = vec![Vec3A::ZERO; self.kernel.rows()];
+        self.kernel.irradiance(radiance, &mut irradiance);
+        irradiance
+    }
+
+    /// Fills what the volume holds of radiance: all that surfaces send towards the probes, with what they emit where
+    /// `emits`. Without `masks` the light of the probes is not asked.
+    pub fn keep_radiance(&self, volume: &mut Volume, masks: Option<&Masks>, emits: bool) {
+        /// Probes at once: bounds the memory of what is on its way.
+        const AT_ONCE: usize = 64;
+        let active: Vec<usize> = volume.active().collect();
+        for chunk in active.chunks(AT_ONCE) {
+            let of_probe = |&p: &usize| {
+                let mask = |i: usize| masks.map(|masks| masks.0[p][i]);
+                self.captures
+                    .with(p, |capture| (self.outgoing(volume, p, capture, mask, emits).0, capture.seen.clone()))
+            };
+            let found: Vec<_> = chunk.par_iter().map(of_probe).collect();
+            for (&p, (radiance, seen)) in chunk.iter().zip(found) {
+                volume.radiance.set(p, &radiance, |o| seen.get(o).and_then(Seen::surface));
             }
         }
-        let mut irradiance = vec![Vec3A::ZERO; self.kernel.rows()];
-        self.kernel.irradiance(&radiance, &mut irradiance);
-        (irradiance, non_finite)
     }
 
     /// Seconds that one application at these probes takes.
@@ -177,17 +240,6 @@ impl<C: Captures> Operator<'_, C> {
         let apply = |(&p, masks): (&usize, &Vec<u8>)| self.apply_to(volume, p, Some(masks));
         std::hint::black_box(probes.par_iter().zip(&masks).map(apply).collect::<Vec<_>>());
         started.elapsed().as_secs_f64()
-    }
-
-    /// What a surfel reflects of the light in the probes. `mask`: the corners that it sees, 0 where that is not known.
-    #[inline]
-    pub(super) fn reflected(&self, query: &Query, surfel: &Surfel, point: &QueryPoint, mask: u8) -> Vec3 {
-        let visibility = match mask {
-            0 => Visibility::Stored,
-            mask => Visibility::Exact(mask),
-        };
-        let weights = query.weights(point, visibility);
-        reflected_radiance(surfel.albedo(), query.blend(&weights, point, surfel.oct()))
     }
 
     /// How a probe asks for the light at one of its surfels. What the method does not look at is left zero.
@@ -233,6 +285,22 @@ impl<C: Captures> Operator<'_, C> {
         let unknowns = energies.iter().flatten().count() * kernel.rows() / group;
         energies.iter().flatten().sum::<f64>() / unknowns.max(1) as f64
     }
+}
+
+/// Radiance in every texel of a capture from that which leaves each of its surfels, in their order, and how many of these
+/// were not finite.
+#[inline]
+fn add_up(capture: &ProbeCapture, leaving: impl Iterator<Item = Vec3>, emits: bool) -> (Vec<Vec3A>, u64) {
+    let mut radiance = if emits { capture.emitted_radiance() } else { vec![Vec3A::ZERO; capture.texels] };
+    let mut non_finite = 0;
+    for (surfel, leaving) in capture.surfels.iter().zip(leaving) {
+        if leaving.is_finite() {
+            radiance[surfel.texel as usize] += Vec3A::from(leaving);
+        } else {
+            non_finite += 1;
+        }
+    }
+    (radiance, non_finite)
 }
 
 /// The unknowns that the volume's irradiance now stands for.

@@ -8,6 +8,8 @@
 //! The residual of E is g(E) − E, in the max norm: for a filter and weights that are means, ‖T‖∞ bounds how far E is from
 //! the solution, ‖E − E*‖∞ ≤ ‖r‖∞/(1 − ‖T‖∞), whichever way E was found.
 
+use std::collections::BTreeMap;
+
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -60,9 +62,39 @@ pub struct Solution {
     pub plain_fallbacks: u64,
     /// Unknowns that a combination had left negative, and that a plain iteration went on from as 0 or as they were before.
     pub negative_texels: u64,
+    /// Why frames or traced iterations ended; `None` for other solvers.
+    #[serde(default)]
+    pub stopped: Option<Stopped>,
+    /// Rays that iterations have traced: primary and shadow.
+    #[serde(default)]
+    pub rays: (u64, u64),
+    /// Hits outside the hull of the probes, and hits whose light was clamped, in all iterations.
+    #[serde(default)]
+    pub hits_outside_volume: u64,
+    #[serde(default)]
+    pub light_clamped: u64,
     /// Applications beside those of the iteration, to learn the spectral radius.
     pub probing_applications: usize,
     pub non_finite: u64,
+}
+
+/// Why iterations ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stopped {
+    /// The light has settled.
+    Settled,
+    /// So many were asked for at most.
+    Limit,
+}
+
+impl Stopped {
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Stopped::Settled => "settled",
+            Stopped::Limit => "as many as there may be",
+        }
+    }
 }
 
 /// What the solver decides by.
@@ -86,6 +118,10 @@ pub struct Progress {
     pub control: Control,
     /// Absent where iterations are not combined.
     pub history: Option<History>,
+    /// What else a checkpoint must hold, by name.
+    pub fields: BTreeMap<String, Field>,
+    /// Whether there is state that neither this nor the volume's irradiance holds, so that no checkpoint can be made.
+    pub is_partial: bool,
 }
 
 /// What an iteration changed, per channel where it is a vector.
@@ -118,9 +154,12 @@ pub fn solve<C: Captures>(
     let emission_first = most == 0 || settings.max_bounces.is_some() && operator.gathers_emission;
     let first = u32::from(!emission_first);
     let done = progress.solution.bounces.len() as u32;
-    if done == 0 {
+    // Who asks for no second reflection asks for no bound of what is missing.
+    if done == 0 && settings.max_bounces.is_none_or(|most| most > 1) {
         progress.solution.operator_norm = Some(operator.norm(volume).as_dvec3().to_array());
     }
+    // What the last reflection was made of, where radiance is stored: it is that reflection.
+    let mut before_last: Option<Field> = None;
     for index in first + done..=most {
         if progress.solution.converged {
             break;
@@ -133,7 +172,7 @@ pub fn solve<C: Captures>(
             _ => operator.apply(volume, masks),
         };
         let change = measure(&x, &g, signed);
-        let Progress { solution, control, history } = &mut progress;
+        let Progress { solution, control, history, .. } = &mut progress;
         let rising = solution
             .last_change
             .map_or([false; 3], |last| [0, 1, 2].map(|c| change.largest_change[c] as f64 > last[c]));
@@ -176,7 +215,18 @@ pub fn solve<C: Captures>(
             _ => g,
         };
         store(volume, &next);
+        if !volume.radiance.is_empty() && index > first {
+            before_last = Some(x);
+        }
         on_iteration(&progress, volume);
+    }
+    if !volume.radiance.is_empty() {
+        let last = field_of(volume);
+        let asked = before_last.is_some();
+        store(volume, before_last.as_ref().unwrap_or(&last));
+        let masks = asked.then(|| masks.unwrap_or_else(|| operator.masks(volume)));
+        operator.keep_radiance(volume, masks.as_ref(), true);
+        store(volume, &last);
     }
     let mut solution = progress.solution;
     if !operator.gathers_emission {

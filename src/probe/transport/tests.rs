@@ -19,6 +19,8 @@ use crate::probe::store::kernel::Directions;
 use crate::probe::store::sh::ShStore;
 use crate::probe::store::{IrradianceStore, Occlusion};
 
+mod frames;
+
 const DIRECT: f32 = 0.25;
 const EMITTED: f32 = 0.5;
 
@@ -55,6 +57,8 @@ impl World {
             positions: vec![Vec3::ZERO],
             irradiance: store.zeros(1, 1),
             occlusion: Occlusion::None,
+            radiance: Default::default(),
+            layout: Default::default(),
         };
         World { captures: vec![capture], volume }
     }

@@ -38,6 +38,7 @@ impl Truth {
         seed: u64,
         progress: Progress,
     ) -> Truth {
+        let resampling = settings.rays.resampling();
         let kernel = volume.irradiance.kernel(&settings.rays.directions());
         let lobes = volume.irradiance.lobes();
         let contacts = Contacts::of_points(world.scene, &volume.positions);
@@ -49,6 +50,8 @@ impl Truth {
                 distance_clamp_m: None,
                 hit_light: HitLight::Paths(paths),
                 keeps_geometric: false,
+                sees: false,
+                resampling: resampling.as_ref(),
                 seed: seed.wrapping_add((run + 1).wrapping_mul(SEED_STEP)),
             };
             let probe = |p: usize| -> Vec<Vec3A> {

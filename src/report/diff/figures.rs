@@ -78,6 +78,17 @@ impl Facts {
         self.0.get(place).filter(|value| !value.is_null())
     }
 
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Whether a report of this layout says anything about a figure, be it that it is undefined. Reports of older programs
+    /// lack what was not thought of.
+    pub fn knows(&self, place: &str) -> bool {
+        let above = place.match_indices('.').map(|(dot, _)| &place[..dot]);
+        above.chain([place]).any(|place| self.0.contains_key(place))
+    }
+
     /// A number, or 1 for yes and 0 for no.
     pub fn number(&self, place: &str) -> Option<f64> {
         let value = self.get(place)?;

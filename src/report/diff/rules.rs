@@ -76,6 +76,8 @@ pub struct Finding {
     pub seeds: Seeds,
     /// What limits of 1 allow: `relative`, and `other_seeds`.
     pub scales: [f64; 2],
+    /// Whether the base's report is too old to have this figure: nothing is judged then.
+    pub is_new: bool,
 }
 
 /// All findings about an item of this kind. `pair`: of the comparison of the two.
@@ -132,6 +134,10 @@ impl Rule {
             let [a, b, c, d] = [least[0], most[0], least[1], most[1]].map(|number| format::significant(number, 4));
             explanation += &format!(" Over the runs: base {a} to {b}, candidate {c} to {d}.");
         }
+        let is_new = base.is_none() && self.how != How::Pair && !sides[0].is_empty() && !sides[0].knows(&place);
+        if is_new {
+            explanation += " The base's report does not have it: it is not judged.";
+        }
         let item = join(item, if self.of == "*" { label } else { &self.of });
         let (name, unit) = (self.gate.clone(), self.unit.as_str());
         let gate = Gate { name, item, base, candidate, value, unit, standard_error, explanation, ..Gate::default() };
@@ -142,6 +148,7 @@ impl Rule {
             noise: None,
             seeds,
             scales: [scale, whole.unwrap_or(scale)],
+            is_new,
         })
     }
 }

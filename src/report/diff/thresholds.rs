@@ -121,7 +121,7 @@ impl Thresholds {
     /// Holds a finding against its limit.
     pub fn judge(&self, found: Finding) -> Gate {
         let (limit, source) = self.limit(&found.gate.name, &found.gate.item);
-        let is_judged = limit != Limit::default();
+        let is_judged = limit != Limit::default() && !found.is_new;
         // What noise may do is measured, or bounded where the seeds are others; the smaller of both.
         let of_noise = limit.other_seeds.filter(|_| found.seeds == Seeds::Other).map(|share| share * found.scales[1]);
         let known_error = found.gate.standard_error.filter(|_| found.freedom.is_none());
@@ -243,6 +243,23 @@ mod tests {
         let mut undefined = changed(0.0);
         undefined.gate.value = Some(f64::NAN);
         assert!(!thresholds().judge(undefined).passed);
+    }
+
+    #[test]
+    fn figures_that_the_base_is_too_old_for_are_shown() {
+        let report =
+            |leak: serde_json::Value| Facts::of(&json!({"methods": [{"name": "visibility_on", "leak": leak}]}));
+        let judged = |base: serde_json::Value| {
+            let candidate = report(json!({"light": 0.0, "blocks": 0.5}));
+            let found = findings("render", "", [&report(base), &candidate], &Facts::default(), Seeds::Equal);
+            found.into_iter().map(|f| thresholds().judge(f)).find(|gate| gate.name == "leak.blocks").unwrap()
+        };
+        let old = judged(json!({"light": 0.0}));
+        assert!(old.passed && old.threshold.is_none() && old.explanation.contains("not judged"), "{old:?}");
+        // One that says it is undefined, and one that says it is less, are no such reports.
+        for base in [json!({"light": 0.0, "blocks": null}), json!({"light": 0.0, "blocks": 0.1}), json!(null)] {
+            assert!(!judged(base.clone()).passed, "{base}");
+        }
     }
 
     #[test]

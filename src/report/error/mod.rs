@@ -11,6 +11,7 @@
 //! |---|---|---|
 //! | `bias` | Σd/M | the same |
 //! | `rmse` | √(Σd²/M) | √(max(0, Σ(d² − v)/M)) |
+//! | `nrmse` | `rmse` ÷ mean luminance of r | through `rmse`; the standard error contains the mean's noise |
 //! | `relmse` | Σ(d²/(r² + ε))/M, ε = 10⁻²·mean(r)² | [`terms::relative_square`]; d² − v where noise is small |
 //! | `mae` | Σ\|d\|/M | Σ(\|d\| − b)/M with the folded normal's b, [`terms::fold`] |
 //! | `over`, `under` | Σmax(0, ±d)/M | Σ(max(0, ±d) − b/2)/M |
@@ -34,7 +35,8 @@ mod window;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::reference_layers::ReferenceLayers;
+use super::reference_layers::{ReferenceLayers, ReferenceNoise};
+use crate::math::color::luminance;
 use crate::shade::regions::Region;
 use pooled::Pooled;
 use terms::{FOLD_UNCERTAINTY, fold, is_continued, relative_square};
@@ -61,6 +63,10 @@ pub struct Figures {
     /// W·m⁻², as are `rmse`, `bias`, `over`, `under`.
     pub mae: Option<f64>,
     pub rmse: Option<f64>,
+    /// `rmse` ÷ the mean luminance of the reference over the whole picture's surfaces: often called relative RMSE. `null`
+    /// if that mean is 0.
+    #[serde(default)]
+    pub nrmse: Option<f64>,
     pub relmse: Option<f64>,
     /// Positive if the picture is too bright.
     pub bias: Option<f64>,
@@ -95,6 +101,9 @@ pub struct ErrorReport {
     pub relmse_epsilon: f64,
     /// Peak of `psnr_db`, W·m⁻². It is the same for the whole picture and its regions.
     pub psnr_peak: f64,
+    /// Mean luminance of the reference that `nrmse` is relative to, W·m⁻². It is the same for the whole picture and its
+    /// regions.
+    pub nrmse_mean: f64,
     /// Number of pixels that are left out because the picture or the reference is not finite there.
     pub pixels_not_finite: usize,
 }
@@ -111,6 +120,8 @@ struct Sums {
     pixels: usize,
     /// `bias`, `mae`, `over`, `under`, squared errors, `relmse`; the last is not finite where ε is 0.
     pooled: [Pooled; 6],
+    /// Sum of the covariances of a pixel's squared errors with its luminance in the reference.
+    square_with_mean: f64,
     /// Sum of the corrections [`fold`].
     fold: f64,
     /// Sum of the uncertainties of relative squares: a share of the correction, or the whole term where the noise is as
@@ -155,6 +166,7 @@ pub fn measure(
         by_region: ByRegion { corner: finish(1), flat: finish(2) },
         relmse_epsilon: scale.epsilon,
         psnr_peak: scale.peak,
+        nrmse_mean: scale.mean,
         pixels_not_finite: (0..mask.len()).filter(|&i| regions[i].is_some() && !mask[i]).count(),
     }
 }
@@ -172,6 +184,11 @@ struct Scale {
     peak: f64,
     /// Uncertainty of the peak, W·m⁻², from the noise of the pixel and channel in which it was found.
     peak_error: f64,
+    /// Mean luminance, W·m⁻², and the variance of that mean.
+    mean: f64,
+    mean_variance: f64,
+    /// Pixels in that mean, at least 1.
+    pixels: f64,
 }
 
 impl Scale {
@@ -186,8 +203,14 @@ impl Scale {
                 peak_error = reference.noise.as_ref().map_or(0.0, |n| PEAK_SIGMAS * n.between(i, c, c).sqrt());
             }
         }
-        let mean = sum / count.max(1.0);
-        Scale { epsilon: RELATIVE_FLOOR * mean * mean, peak, peak_error }
+        let all_channels = sum / count.max(1.0);
+        let shown = || (0..mask.len()).filter(|&i| mask[i]);
+        let pixels = (count / 3.0).max(1.0);
+        let mean = shown().map(|i| f64::from(luminance(reference.irradiance[i]))).sum::<f64>() / pixels;
+        let variance = |noise: &ReferenceNoise| shown().map(|i| noise.luminance_variance(i)).sum::<f64>();
+        let mean_variance = reference.noise.as_ref().map_or(0.0, variance) / (pixels * pixels);
+        let epsilon = RELATIVE_FLOOR * all_channels * all_channels;
+        Scale { epsilon, peak, peak_error, mean, mean_variance, pixels }
     }
 }
 
@@ -229,6 +252,14 @@ impl Sums {
         for (k, pooled) in self.pooled.iter_mut().enumerate() {
             pooled.add(terms.map(|of_channel| of_channel[k]), noise);
         }
+        if let Some((noise, i)) = noise {
+            // Covariance with the luminance, as far as the squared error is a linear function of the reference.
+            let with_luminance = |c: usize| {
+                let weight = |other: usize| f64::from(luminance(Vec3::AXES[other]));
+                (0..3).map(|other| weight(other) * noise.between(i, c, other)).sum::<f64>()
+            };
+            self.square_with_mean += (0..3).map(|c| -2.0 * d[c] * with_luminance(c)).sum::<f64>();
+        }
         for c in (0..3).filter(|&c| v[c] != 0.0) {
             let w = r[c] * r[c] + epsilon;
             self.doubtful += if around.is_none_or(|a| is_continued(a[3 + c], a[6 + c], epsilon)) {
@@ -246,17 +277,19 @@ impl Sums {
         if self.pixels == 0 {
             return ErrorEstimate::default();
         }
-        let Scale { epsilon, peak, peak_error } = *scale;
+        let Scale { epsilon, peak, peak_error, mean, mean_variance, pixels } = *scale;
         let samples = 3.0 * self.pixels as f64;
         let [bias, mae, over, under, square, relmse] = &self.pooled;
         let square_error = square.variance(samples).sqrt();
         let square = square.mean(samples).max(0.0);
         let rmse = square.sqrt();
         let relative = |value: f64| (epsilon > 0.0).then_some(value);
+        let normalised = |value: f64| (mean > 0.0).then(|| value / mean);
         let psnr = |value: f64| (square > 0.0 && peak > 0.0).then_some(value);
         let figures = Figures {
             mae: Some(mae.mean(samples).max(0.0)),
             rmse: Some(rmse),
+            nrmse: normalised(rmse),
             relmse: relative(relmse.mean(samples).max(0.0)),
             bias: Some(bias.mean(samples)),
             over: Some(over.mean(samples).max(0.0)),
@@ -268,9 +301,16 @@ impl Sums {
         // The uncertainty of the correction by `fold` is systematic: it does not fall with the number of pixels.
         let folded = FOLD_UNCERTAINTY * self.fold / samples;
         let error = |pooled: &Pooled, systematic: f64| known(pooled.variance(samples).sqrt().hypot(systematic));
+        let rmse_error = root_error(rmse, square_error);
+        // Of a quotient: var(a/m)·m² = var(a) + (a/m)²·var(m) − 2(a/m)·cov(a, m), with cov(rmse, m) = cov(rmse², m)/(2·rmse).
+        let covariance = self.square_with_mean / (samples * pixels);
+        let of_mean = if mean > 0.0 { (rmse / mean).powi(2) * mean_variance - covariance / mean } else { 0.0 };
+        // Near a difference of 0 the covariance is noise itself: it must not shorten the bar.
+        let quotient_error = rmse_error * rmse_error + of_mean.max(0.0);
         let standard_error = Figures {
             mae: error(mae, folded),
-            rmse: known(root_error(rmse, square_error)),
+            rmse: known(rmse_error),
+            nrmse: normalised(quotient_error.sqrt()).and_then(known),
             relmse: relative(0.0).and(error(relmse, self.doubtful / samples)),
             bias: error(bias, 0.0),
             over: error(over, folded / 2.0),
@@ -291,7 +331,7 @@ impl Sums {
 /// Standard error of a root x from the standard error s of its square. It is half the larger of the distances from x to
 /// √(x² + 2s) and to √(max(0, x² − 2s)). For small s this equals s/(2x), the result of the delta method, which grows
 /// without bound near x = 0.
-fn root_error(root: f64, square_error: f64) -> f64 {
+pub(super) fn root_error(root: f64, square_error: f64) -> f64 {
     let at = |sigmas: f64| (root * root + sigmas * square_error).max(0.0).sqrt();
     ((at(2.0) - root) / 2.0).max((root - at(-2.0)) / 2.0)
 }

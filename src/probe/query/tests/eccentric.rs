@@ -126,7 +126,7 @@ fn coarse_tiles_are_steeper() {
     assert_eq!(fixture.volume.grid.width(ProbeIndex(3)), 1);
     // Four cells wide: the box is four times as large, and so are mean and deviation at the same shares; what lies behind
     // the mean counts four times. Along x: way 2·4 = 8, μ = 2, σ = 4; at 3: 16/(16 + (4·1)²).
-    let at = |distance: f32| tiles.visibility(3, Vec3::X * distance, SPACING * 4.0, 4.0);
+    let at = |distance: f32| tiles.visibility(3, Vec3::X * distance, SPACING * 4.0, 4.0, 0.0);
     assert_eq!((at(1.9), at(2.0), at(0.0)), (1.0, 1.0, 1.0));
     assert!((at(3.0) - 0.5).abs() < 1e-6, "{}", at(3.0));
     assert_eq!(tiles.maps.sample(3, &tiles.maps.taps(oct_from_direction(Vec3::X))), Vec2::new(0.25, 0.5));

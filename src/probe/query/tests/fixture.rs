@@ -38,6 +38,8 @@ impl Fixture {
             positions: grid.probes().map(|probe| grid.grid_point(probe)).collect(),
             irradiance: maps(count, IrradianceCurve::Linear),
             occlusion: Occlusion::None,
+            radiance: Default::default(),
+            layout: Default::default(),
             grid,
         };
         // Cells are those of the points themselves but where a test says otherwise.

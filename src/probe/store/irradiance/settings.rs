@@ -142,6 +142,19 @@ impl IrradianceStore {
         }
     }
 
+    /// Format of its colours, and of those of radiance beside it.
+    pub fn format(&self) -> ColorFormat {
+        match self {
+            IrradianceStore::Octahedral(store) => store.format,
+            IrradianceStore::Sh9(store) => store.format,
+        }
+    }
+
+    /// Whether every unknown is irradiance, which is nowhere negative.
+    pub fn is_irradiance(&self) -> bool {
+        matches!(self, IrradianceStore::Octahedral(_))
+    }
+
     pub fn fineness(&self) -> Fineness {
         match self {
             IrradianceStore::Octahedral(store) => {

@@ -21,7 +21,7 @@ impl Kernel {
             }
         }
         let total: f64 = areas.iter().sum();
-        let mut kernel = Kernel { row_start: vec![0], entries: Vec::with_capacity(texels * COUNT) };
+        let mut kernel = Kernel { row_start: vec![0], entries: Vec::with_capacity(texels * COUNT), dense: None };
         for j in 0..COUNT {
             let factor =
                 f64::from(Y0) * f64::from(COSINE[j]) / std::f64::consts::PI * 4.0 * std::f64::consts::PI / total;

@@ -54,9 +54,12 @@ fn a_sphere_of_surfaces_is_found_everywhere() {
             // Shares of a way that bends at the edges of the box are bilinear among texels of up to 0.15 rad.
             assert!((mean / radius - 1.0).abs() < 0.12, "{direction}: {mean}");
         }
-        let at = |share: f32| tiles.visibility(0, Vec3::new(0.6, 0.64, 0.48) * radius * share, sides, farther);
+        let at = |share: f32| tiles.visibility(0, Vec3::new(0.6, 0.64, 0.48) * radius * share, sides, farther, 0.0);
         assert_eq!(at(0.8), 1.0);
         assert!(at(1.3) < 1e-3, "{}", at(1.3));
+        // A point that counts as nearer by as much is before the surface again.
+        let direction = Vec3::new(0.6, 0.64, 0.48);
+        assert_eq!(tiles.visibility(0, direction * radius * 1.3, sides, farther, 0.5 * radius), 1.0);
     }
 }
 

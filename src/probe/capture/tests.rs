@@ -1,0 +1,234 @@
+//! Captures by different rays of the same surroundings.
+
+use std::f32::consts::PI;
+
+use glam::{Vec3, Vec3A};
+
+use super::*;
+use crate::math::octahedral::texel_direction;
+use crate::probe::store::kernel::{Directions, Kernel};
+use crate::scene::{self, LoadOptions, Scene};
+
+fn scene(name: &str) -> Scene {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.glb"));
+    scene::load(&path, &LoadOptions::default()).unwrap()
+}
+
+fn settings(rays: Rays) -> CaptureSettings {
+    CaptureSettings { rays, emission: EmissionTransport::Gathered, ..Default::default() }
+}
+
+fn capture<'a>(
+    world: &'a World<'a>,
+    settings: &'a CaptureSettings,
+    resampling: Option<&'a Resampling>,
+) -> Capture<'a, 'a> {
+    let hit_light = HitLight::Direct;
+    Capture {
+        world,
+        settings,
+        distance_clamp_m: Some(10.0),
+        hit_light,
+        keeps_geometric: true,
+        sees: true,
+        resampling,
+        seed: 1,
+    }
+}
+
+fn octahedral(resolution: usize, per_texel: usize) -> Rays {
+    Rays::Octahedral(OctahedralRays { resolution, per_texel })
+}
+
+/// What a capture's texels hold of light, and the mean of their distances.
+fn texels(captured: &ProbeCapture) -> (Vec<Vec3A>, Vec<f64>, Vec<Vec3A>) {
+    let mut albedo = vec![Vec3A::ZERO; captured.texels];
+    captured.surfels.iter().for_each(|s| albedo[s.texel as usize] += Vec3A::from(s.albedo()));
+    (captured.emitted_radiance(), captured.distances.iter().map(Moments::mean).collect(), albedo)
+}
+
+/// The cube's map is the octahedral one, blurred: the means under wide lobes are the same, and texels away from edges too.
+#[test]
+fn cubes_and_octahedral_maps_see_the_same() {
+    let scene = scene("cornell");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let (low, high) = scene.mesh.bounds().unwrap();
+    let position = low + (high - low) * Vec3::new(0.45, 0.6, 0.55);
+    let n = 32;
+    let fine = settings(octahedral(n, 64));
+    let map = capture(&world, &fine, None).probe(0, position, |_| true);
+    // A lobe of 1/√128 = 0.09 rad against the map's texels as in the preset.
+    let rays = Rays::Cube(CubeRays { face: 128, resolution: Some(n), sharpness: 128.0 });
+    let resampling = rays.resampling().unwrap();
+    let coarse = settings(rays.clone());
+    let cube = capture(&world, &coarse, Some(&resampling)).probe(0, position, |_| true);
+    assert_eq!((cube.texels, cube.rays.primary), (n * n, rays.count() as u64));
+    let (a, b) = (texels(&map), texels(&cube));
+    let axes: Vec<Vec3> = (0..16).map(|o| texel_direction(o % 4, o / 4, 4)).collect();
+    let directions = Directions::octahedral(n);
+    let cosine = Kernel::cosine(&directions, &axes);
+    let filtered = |texels: &[Vec3A]| {
+        let mut out = vec![Vec3A::ZERO; axes.len()];
+        cosine.irradiance(texels, &mut out);
+        out
+    };
+    for (what, a, b) in [("emission", &a.0, &b.0), ("albedo", &a.2, &b.2)] {
+        let largest = filtered(a).into_iter().fold(Vec3A::ZERO, Vec3A::max).max_element();
+        for (a, b) in filtered(a).into_iter().zip(filtered(b)) {
+            // The blur moves light by 0.09 rad in all directions alike: 0.09² of it is lost to a cosine. Sums over the
+            // map's texels, up to 0.14 rad wide, catch a lobe of that width to 0.1 %; the lamp's edges in texels of the
+            // map add 1 %.
+            assert!((a - b).abs().max_element() < 0.025 * largest, "{what}: {a} {b}");
+        }
+    }
+    // Mean distances under the lobe of the moments.
+    let lobe = Kernel::lobe(&directions, &axes, 50.0);
+    for (a, b) in lobe.distance(&map.distances).iter().zip(lobe.distance(&cube.distances)) {
+        // The blur widens the lobe, of 1/√50 = 0.14 rad, by a fifth.
+        assert!((a.mean() / b.mean() - 1.0).abs() < 0.03, "{} {}", a.mean(), b.mean());
+    }
+    // Where a texel and its neighbours lie on one flat wall, the surface itself is the same.
+    let mut flat = 0;
+    for o in 0..n * n {
+        let (Some((na, da)), Some((nb, db))) = (map.surface_in(o), cube.surface_in(o)) else { continue };
+        let variance = cube.distances[o].variance();
+        if na.dot(nb) > 0.9999 && variance < 0.01 * da as f64 * da as f64 {
+            flat += 1;
+            // The distance of a wall grows within the lobe by 0.09²·(1 + tan²) of itself: 3 % at 60°.
+            assert!((da / db - 1.0).abs() < 0.05, "texel {o}: {da} {db}");
+        }
+    }
+    assert!(flat > n * n / 2, "{flat} flat texels");
+}
+
+/// The texels of a cube that is not resampled are kept with their solid angles: a filter makes of them what it makes of a fine
+/// octahedral map, and of one radiance exactly π times it.
+#[test]
+fn cubes_are_kept_as_they_are() {
+    let scene = scene("cornell");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let (low, high) = scene.mesh.bounds().unwrap();
+    let position = low + (high - low) * Vec3::new(0.45, 0.6, 0.55);
+    let fine = settings(octahedral(64, 16));
+    let rays = Rays::Cube(CubeRays { face: 256, resolution: None, ..Default::default() });
+    assert!(rays.resampling().is_none() && rays.side().is_none());
+    assert_eq!((rays.texels(), rays.kept()), (rays.count(), 6 * 256 * 256));
+    let plain = settings(rays.clone());
+    let map = capture(&world, &fine, None).probe(0, position, |_| true);
+    let cube = capture(&world, &plain, None).probe(0, position, |_| true);
+    assert_eq!((cube.texels, cube.geometric.len()), (rays.count(), cube.surfels.len()));
+    let filtered = |rays: &Rays, radiance: &[Vec3A]| {
+        let mut out = vec![Vec3A::ZERO; 9];
+        Kernel::harmonics(&rays.directions()).irradiance(radiance, &mut out);
+        out
+    };
+    let even = filtered(&rays, &vec![Vec3A::ONE; cube.texels]);
+    // Rounding of sums of 400,000 f32, in four lanes.
+    assert!((even[0].x / PI - 1.0).abs() < 1e-4 && even[1..].iter().all(|e| e.x.abs() < 1e-4), "{even:?}");
+    let albedo = |captured: &ProbeCapture| {
+        let mut albedo = vec![Vec3A::ZERO; captured.texels];
+        captured.surfels.iter().for_each(|s| albedo[s.texel as usize] += Vec3A::from(s.albedo()));
+        albedo
+    };
+    for (what, a, b) in
+        [("emission", map.emitted_radiance(), cube.emitted_radiance()), ("albedo", albedo(&map), albedo(&cube))]
+    {
+        let (a, b) = (filtered(&fine.rays, &a), filtered(&rays, &b));
+        let largest = a.iter().copied().fold(Vec3A::ZERO, Vec3A::max).max_element();
+        for (a, b) in a.iter().zip(&b) {
+            // Edges of the lamp run along rows of the cube, which are in or out as a whole: it has about sixty each way.
+            assert!((*a - *b).abs().max_element() < 0.03 * largest, "{what}: {a} {b}");
+        }
+    }
+}
+
+/// Surfels of a resampled cube stand on surfaces.
+#[test]
+fn resampled_hits_lie_on_surfaces() {
+    let scene = scene("cornell");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let (low, high) = scene.mesh.bounds().unwrap();
+    let position = 0.5 * (low + high);
+    let rays = Rays::Cube(CubeRays { face: 32, resolution: Some(16), sharpness: 64.0 });
+    let (resampling, settings) = (rays.resampling().unwrap(), settings(rays));
+    let found = capture(&world, &settings, Some(&resampling)).probe(0, position, |_| true);
+    assert!(found.surfels.len() > 200);
+    assert_eq!(found.geometric.len(), found.surfels.len());
+    for (surfel, geometric) in found.surfels.iter().zip(&found.geometric) {
+        let hit = world.surface(Ray::new(position, (surfel.position - position).normalize(), 0)).unwrap();
+        // Rounding of a ray of some metres.
+        assert!((hit.hit.t - surfel.position.distance(position)).abs() < 1e-4, "{}", surfel.position);
+        assert_eq!(*geometric, PackedNormal::of(hit.geometric_normal));
+    }
+}
+
+/// From outside of a closed box whose fronts look inwards, every hit is a back.
+#[test]
+fn backs_are_left_out_and_count_as_nearer() {
+    let scene = scene("furnace");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let (low, high) = scene.mesh.bounds().unwrap();
+    let outside = Vec3::new(high.x + 0.5, 0.5 * (low.y + high.y), 0.0);
+    let rays = Rays::Fibonacci(FibonacciRays { count: 128 });
+    let plain = settings(rays);
+    let mut strict = plain.clone();
+    strict.backs = Backs { radiance: BackRadiance::LeaveOut { most: 0.1 }, distance_factor: 0.2 };
+    let reflecting = capture(&world, &plain, None).probe(0, outside, |_| true);
+    let left_out = capture(&world, &strict, None).probe(0, outside, |_| true);
+    assert!(reflecting.backs.is_empty() && !reflecting.surfels.is_empty());
+    let hits: Vec<u32> = reflecting.surfels.iter().map(|s| s.texel).collect();
+    assert_eq!(left_out.backs, hits);
+    assert!(left_out.surfels.is_empty() && left_out.emitted.is_empty());
+    for t in 0..128 {
+        let (a, b) = (reflecting.distances[t].mean(), left_out.distances[t].mean());
+        let expected = if hits.contains(&(t as u32)) { 0.2 * a } else { a };
+        assert!((b - expected).abs() < 1e-6, "ray {t}: {b} instead of {expected}");
+    }
+    // A tenth of 128 rays: 12 are fewer, 13 are not.
+    assert!(strict.backs.allow(12, 128) && !strict.backs.allow(13, 128) && plain.backs.allow(128, 128));
+    let inside = capture(&world, &strict, None).probe(0, 0.5 * (low + high), |_| true);
+    assert!(inside.backs.is_empty() && inside.surfels.len() == 128);
+}
+
+#[test]
+fn frames_turn_all_rays_alike_and_depend_on_nothing_else() {
+    let scene = scene("furnace");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let position = 0.5 * scene.mesh.bounds().map(|(low, high)| low + high).unwrap();
+    let rays = Rays::Fibonacci(FibonacciRays { count: 64 });
+    let settings = settings(rays.clone());
+    let capture = capture(&world, &settings, None);
+    let (one, again) = (capture.frame(0, position, |_| true, 3), capture.frame(0, position, |_| true, 3));
+    let other = capture.frame(0, position, |_| true, 4);
+    let points = |c: &ProbeCapture| c.surfels.iter().map(|s| s.position).collect::<Vec<_>>();
+    assert_eq!(points(&one), points(&again));
+    assert_ne!(points(&one), points(&other));
+    let rotation = frame_rotation(1, 3);
+    for (surfel, (direction, _)) in one.surfels.iter().zip(rays.directions().texel_means()) {
+        let expected = rotation * direction;
+        assert!((surfel.position - position).normalize().distance(expected) < 1e-5);
+    }
+    // A uniform rotation takes an axis to a uniform direction: its mean is 0 with a standard deviation of 1/√(3·4096) =
+    // 0.009 in each component; five of them.
+    let mean = (0..4096).map(|f| frame_rotation(7, f) * Vec3::X).sum::<Vec3>() / 4096.0;
+    assert!(mean.abs().max_element() < 0.045, "{mean}");
+}
+
+#[test]
+fn lone_rays_stand_for_equal_parts_of_the_sphere() {
+    let rays = Rays::Fibonacci(FibonacciRays { count: 256 });
+    assert_eq!((rays.without(32).count(), octahedral(8, 1).without(32).count()), (224, 64));
+    let kernel = Kernel::cosine(&rays.directions(), &[Vec3::X, Vec3::new(0.6, 0.0, 0.8)]);
+    let radiance: Vec<Vec3A> = rays.directions().texel_means().iter().map(|(d, _)| Vec3A::splat(1.0 + d.x)).collect();
+    let mut e = [Vec3A::ZERO; 2];
+    kernel.irradiance(&radiance, &mut e);
+    // π·(1 + 2/3·n·x), by 256 even points.
+    for (e, cosine) in e.iter().zip([1.0, 0.6]) {
+        assert!((e.x / (PI * (1.0 + 2.0 / 3.0 * cosine)) - 1.0).abs() < 0.01, "{e}");
+    }
+    // Rays that are left out count neither as light nor as darkness.
+    let out: Vec<u32> = (0..256).step_by(3).collect();
+    let left = kernel.irradiance_without(&vec![Vec3A::ONE; 256], &out).unwrap();
+    assert!(left.iter().all(|e| (e.x / PI - 1.0).abs() < 1e-5), "{left:?}");
+    assert!(kernel.irradiance_without(&radiance, &(0..256).collect::<Vec<_>>()).is_none());
+}

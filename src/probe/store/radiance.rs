@@ -1,0 +1,337 @@
+//! The light that probes see themselves: light fields, and levels of radiance for glossy surfaces.
+//!
+//! A light field holds of every texel the outgoing radiance, W·m⁻²·sr⁻¹, the normal, octahedral, and the distance of what
+//! the probe sees there, metres; where it sees no surface, the normal is that of the direction back to the probe and the
+//! distance [`FAR_M`]. Level 0 of the levels is the same radiance, and each of the others the mean of 2×2 texels of the one
+//! above, as texture units do it. A probe takes `R′²·(4 + 4 + 2) + Σ K²·4` bytes in the packed format.
+
+use glam::{Vec2, Vec3, Vec3A};
+use half::f16;
+use safetensors::Dtype;
+use serde::{Deserialize, Serialize};
+
+use super::encode::{ColorFormat, decode_colors, encode_colors};
+use super::map::{OctahedralMaps, fill_with_border};
+use crate::math::octahedral::{oct_from_direction, texel_direction};
+use crate::probe::container::{Container, EncodingLosses};
+
+/// Distance where there is no surface: the largest that f16 holds.
+pub const FAR_M: f32 = 65_504.0;
+
+/// Whether probes keep what they see.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LightFieldStore {
+    #[default]
+    None,
+    /// Radiance, normals and distances in maps of the capture's resolution.
+    Maps,
+}
+
+/// Bytes of a normal and of a distance: two f16 and one.
+const G_BUFFER_BYTES: usize = 4 + 2;
+
+/// What a probe sees.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LightField {
+    pub radiance: OctahedralMaps<Vec3>,
+    pub normal: OctahedralMaps<Vec2>,
+    pub distance: OctahedralMaps<f32>,
+}
+
+/// All radiance that a volume holds.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Radiance {
+    pub light_field: Option<LightField>,
+    /// From the finest to the coarsest.
+    pub prefiltered: Vec<OctahedralMaps<Vec3>>,
+    pub format: Option<ColorFormat>,
+}
+
+/// Which radiance a method stores.
+#[derive(Debug, Clone, Copy)]
+pub struct RadianceStore<'a> {
+    pub light_field: LightFieldStore,
+    pub prefiltered: &'a [usize],
+    pub format: ColorFormat,
+    pub border: usize,
+}
+
+impl RadianceStore<'_> {
+    /// Whether there is none of it.
+    pub fn is_empty(&self) -> bool {
+        self.light_field == LightFieldStore::None && self.prefiltered.is_empty()
+    }
+
+    /// Black maps of captures with so many texels per side.
+    pub fn zeros(&self, probes: usize, side: usize) -> Radiance {
+        let border = self.border;
+        let light_field = (self.light_field == LightFieldStore::Maps).then(|| LightField {
+            radiance: OctahedralMaps::new(probes, side, border, Vec3::ZERO),
+            normal: OctahedralMaps::new(probes, side, border, Vec2::ZERO),
+            distance: OctahedralMaps::new(probes, side, border, FAR_M),
+        });
+        let level = |&n: &usize| OctahedralMaps::new(probes, n, border, Vec3::ZERO);
+        let format = (!self.is_empty()).then_some(self.format);
+        Radiance { light_field, prefiltered: self.prefiltered.iter().map(level).collect(), format }
+    }
+
+    /// Bytes of a probe's light field and of its levels in the layout that shading uses; `g_buffer`: with normals and
+    /// distances.
+    pub fn runtime_bytes(&self, side: usize, g_buffer: bool) -> (usize, usize) {
+        let texels = |n: usize| (n + 2 * self.border).pow(2);
+        let texel = self.format.bytes_per_texel();
+        let field = match self.light_field {
+            LightFieldStore::None => 0,
+            LightFieldStore::Maps => texels(side) * (texel + if g_buffer { G_BUFFER_BYTES } else { 0 }),
+        };
+        (field, self.prefiltered.iter().map(|&n| texels(n) * texel).sum())
+    }
+
+    /// Most memory that one probe takes while it is baked and encoded.
+    pub fn working_bytes(&self, side: usize) -> u64 {
+        /// Radiance, normal and distance in floats, and radiance once more with its code.
+        const FIELD: usize = 12 + 8 + 4 + 12 + 12;
+        const LEVEL: usize = 12 + 12 + 12;
+        let texels = |n: usize| (n + 2 * self.border).pow(2);
+        let field = if self.light_field == LightFieldStore::Maps { texels(side) * FIELD } else { 0 };
+        (field + self.prefiltered.iter().map(|&n| texels(n) * LEVEL).sum::<usize>()) as u64
+    }
+
+    /// Why captures with so many texels per side cannot fill it, with the remedy; `None` where they can.
+    pub fn mismatch(&self, side: Option<usize>) -> Option<String> {
+        if self.is_empty() {
+            return None;
+        }
+        let Some(side) = side else {
+            return Some(
+                "store.light_field and store.prefiltered are maps of what is captured: capture.rays must be octahedral, \
+                 or cube with a resolution"
+                    .to_owned(),
+            );
+        };
+        let mut finer = None;
+        for &level in self.prefiltered {
+            let wanted = finer.map_or(side, |n: usize| n / 2);
+            if level != wanted || level == 0 || finer.is_some_and(|n| n % 2 == 1) {
+                return Some(format!(
+                    "store.prefiltered has a level of {level} texels where {wanted} are to be: the first level is as \
+                     large as the capture's map, and each next one half of it"
+                ));
+            }
+            finer = Some(level);
+        }
+        None
+    }
+}
+
+impl Radiance {
+    pub fn is_empty(&self) -> bool {
+        self.light_field.is_none() && self.prefiltered.is_empty()
+    }
+
+    /// As [`RadianceStore::runtime_bytes`].
+    pub fn runtime_bytes(&self, g_buffer: bool) -> (usize, usize) {
+        let prefiltered: Vec<usize> = self.prefiltered.iter().map(|maps| maps.resolution).collect();
+        let first = self.light_field.as_ref().map(|field| &field.radiance).or(self.prefiltered.first());
+        let (Some(first), Some(format)) = (first, self.format) else { return (0, 0) };
+        let light_field = match self.light_field {
+            Some(_) => LightFieldStore::Maps,
+            None => LightFieldStore::None,
+        };
+        let store = RadianceStore { light_field, prefiltered: &prefiltered, format, border: first.border };
+        store.runtime_bytes(first.resolution, g_buffer)
+    }
+
+    /// Sets what a probe sees: radiance by texel and, for light fields, the surfaces there.
+    pub fn set(&mut self, probe: usize, radiance: &[Vec3A], surface: impl Fn(usize) -> Option<(Vec3, f32)>) {
+        let texels: Vec<Vec3> = radiance.iter().map(|&l| l.into()).collect();
+        if let Some(LightField { radiance, normal, distance }) = &mut self.light_field {
+            let (n, border) = (radiance.resolution, radiance.border);
+            let (normals, distances): (Vec<Vec2>, Vec<f32>) = (0..n * n)
+                .map(|o| match surface(o) {
+                    Some((normal, distance)) => (oct_from_direction(normal), distance.min(FAR_M)),
+                    None => (oct_from_direction(-texel_direction(o % n, o / n, n)), FAR_M),
+                })
+                .unzip();
+            fill_with_border(&texels, n, border, radiance.probe_mut(probe));
+            fill_with_border(&normals, n, border, normal.probe_mut(probe));
+            fill_with_border(&distances, n, border, distance.probe_mut(probe));
+        }
+        let mut level = texels;
+        for (i, maps) in self.prefiltered.iter_mut().enumerate() {
+            if i > 0 {
+                level = halved(&level, maps.resolution);
+            }
+            fill_with_border(&level, maps.resolution, maps.border, maps.probe_mut(probe));
+        }
+    }
+
+    /// Writes its tensors.
+    pub fn write(&self, container: &mut Container, losses: &mut EncodingLosses) {
+        let format = self.format.unwrap_or(ColorFormat::R11G11B10F);
+        if let Some(LightField { radiance, normal, distance }) = &self.light_field {
+            write_colors(RADIANCE, radiance, format, container, losses);
+            let side = radiance.side();
+            let probes = radiance.texels.len() / (side * side);
+            let half = |x: f32| f16::from_f32(x).to_le_bytes();
+            let numbers = normal.texels.iter().flat_map(|n| [half(n.x), half(n.y)]);
+            container.put(NORMAL, Dtype::F16, &[probes, side, side, 2], numbers);
+            let numbers = distance.texels.iter().map(|&d| half(d));
+            container.put(DISTANCE, Dtype::F16, &[probes, side, side], numbers);
+        }
+        for (k, maps) in self.prefiltered.iter().enumerate() {
+            write_colors(&level_name(k), maps, format, container, losses);
+        }
+    }
+
+    /// Reads its tensors; inverse of [`Self::write`] up to rounding.
+    ///
+    /// # Errors
+    /// What is missing or out of range.
+    pub fn read(container: &Container, probes: usize, border: usize) -> Result<Radiance, String> {
+        let mut out = Radiance::default();
+        if container.has(RADIANCE) {
+            let (radiance, format) = read_colors(RADIANCE, container, probes, border)?;
+            let side = radiance.side();
+            let halves = |name: &str, shape: &[Option<usize>]| -> Result<Vec<f32>, String> {
+                let numbers = container.tensor(name, &[Dtype::F16], shape)?.u16s();
+                let numbers: Vec<f32> = numbers.map(|bits| f16::from_bits(bits).to_f32()).collect();
+                match numbers.iter().all(|x| x.is_finite()) {
+                    true => Ok(numbers),
+                    false => Err(format!("tensor '{name}' holds numbers that are not finite")),
+                }
+            };
+            let shape = [Some(probes), Some(side), Some(side), Some(2)];
+            let normals = halves(NORMAL, &shape)?;
+            let distances = halves(DISTANCE, &shape[..3])?;
+            let resolution = radiance.resolution;
+            let texels = normals.as_chunks::<2>().0.iter().map(|n| Vec2::from(*n)).collect();
+            let normal = OctahedralMaps { resolution, border, texels };
+            let distance = OctahedralMaps { resolution, border, texels: distances };
+            out.light_field = Some(LightField { radiance, normal, distance });
+            out.format = Some(format);
+        }
+        for k in 0.. {
+            let name = level_name(k);
+            if !container.has(&name) {
+                break;
+            }
+            let (maps, format) = read_colors(&name, container, probes, border)?;
+            out.prefiltered.push(maps);
+            out.format = Some(format);
+        }
+        Ok(out)
+    }
+}
+
+/// The mean of every 2×2 texels; `n` texels per side are left.
+fn halved(texels: &[Vec3], n: usize) -> Vec<Vec3> {
+    let at = |x: usize, y: usize| texels[x + 2 * n * y];
+    (0..n * n)
+        .map(|o| {
+            let (x, y) = (2 * (o % n), 2 * (o / n));
+            0.25 * (at(x, y) + at(x + 1, y) + at(x, y + 1) + at(x + 1, y + 1))
+        })
+        .collect()
+}
+
+/// Names in the file.
+const RADIANCE: &str = "radiance";
+const NORMAL: &str = "normal";
+const DISTANCE: &str = "radial_distance";
+
+fn level_name(k: usize) -> String {
+    format!("prefiltered.{k}")
+}
+
+fn scale_key(name: &str) -> String {
+    format!("scale.{name}")
+}
+
+fn write_colors(
+    name: &str,
+    maps: &OctahedralMaps<Vec3>,
+    format: ColorFormat,
+    container: &mut Container,
+    losses: &mut EncodingLosses,
+) {
+    let colors = encode_colors(&maps.texels, format);
+    let side = maps.side();
+    let shape = [maps.texels.len() / (side * side), side, side, 3];
+    let shape = if format.is_packed() { &shape[..3] } else { &shape };
+    container.put_bytes(name, format.dtype(), shape, colors.bytes);
+    container.put_json(&scale_key(name), &colors.scale);
+    losses.clamped.insert(name.to_owned(), colors.clamped);
+    losses.underflowed.insert(name.to_owned(), colors.underflowed);
+}
+
+fn read_colors(
+    name: &str,
+    container: &Container,
+    probes: usize,
+    border: usize,
+) -> Result<(OctahedralMaps<Vec3>, ColorFormat), String> {
+    let key = scale_key(name);
+    let scale: f32 = container.json(&key)?;
+    if !(scale > 0.0 && scale.is_finite()) {
+        return Err(format!("metadata '{key}' is {scale}"));
+    }
+    let shape = [Some(probes), None, None, Some(3)];
+    let packed = container.tensors.get(name).is_some_and(|t| t.dtype == Dtype::U32);
+    let tensor = match packed {
+        true => container.tensor(name, &[Dtype::U32], &shape[..3])?,
+        false => container.tensor(name, &[Dtype::F16, Dtype::F32], &shape)?,
+    };
+    let format = ColorFormat::of(tensor.dtype).ok_or_else(|| format!("tensor '{name}' has no colour format"))?;
+    let texels = decode_colors(&tensor.bytes, format, scale);
+    if texels.iter().any(|t| !t.is_finite()) {
+        return Err(format!("tensor '{name}' holds numbers that are not finite"));
+    }
+    Ok((OctahedralMaps { resolution: tensor.map_resolution(name, border)?, border, texels }, format))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn store(prefiltered: &[usize]) -> RadianceStore<'_> {
+        RadianceStore { light_field: LightFieldStore::Maps, prefiltered, format: ColorFormat::R11G11B10F, border: 1 }
+    }
+
+    #[test]
+    fn what_is_seen_comes_back_from_the_file() {
+        let mut radiance = store(&[4, 2]).zeros(2, 4);
+        let light: Vec<Vec3A> = (0..16).map(|o| Vec3A::splat(1.0 + o as f32)).collect();
+        radiance.set(1, &light, |o| (o % 3 > 0).then_some((Vec3::Y, o as f32)));
+        // Level 1: the means of 1, 2, 5, 6 and so on, exact in 6 bits.
+        let coarse = &radiance.prefiltered[1];
+        let means: Vec<f32> = [(1, 1), (2, 1), (1, 2), (2, 2)].map(|(c, r)| coarse.probe(1)[c + 4 * r].x).to_vec();
+        assert_eq!(means, [3.5, 5.5, 11.5, 13.5]);
+        let mut container = Container::default();
+        radiance.write(&mut container, &mut EncodingLosses::default());
+        let read = Radiance::read(&container, 2, 1).unwrap();
+        let (a, b) = (radiance.light_field.as_ref().unwrap(), read.light_field.as_ref().unwrap());
+        assert_eq!((&a.normal, &a.distance), (&b.normal, &b.distance));
+        assert_eq!(read.prefiltered.len(), 2);
+        // Half a step of 5 bits.
+        let near = |a: &Vec3, b: &Vec3| (*a - *b).abs().max_element() <= a.max_element() / 64.0;
+        assert!(a.radiance.texels.iter().zip(&b.radiance.texels).all(|(a, b)| near(a, b)));
+        // What the layout counts is what the file holds.
+        let bytes: usize = container.tensors.values().map(|t| t.bytes.len()).sum();
+        let (field, levels) = store(&[4, 2]).runtime_bytes(4, true);
+        assert_eq!(bytes, 2 * (field + levels));
+        container.tensors.remove(NORMAL);
+        assert!(Radiance::read(&container, 2, 1).unwrap_err().contains("normal"));
+    }
+
+    #[test]
+    fn levels_halve_from_the_capture_on() {
+        assert_eq!(store(&[8, 4, 2, 1]).mismatch(Some(8)), None);
+        for (levels, side) in [(&[8, 2][..], Some(8)), (&[4], Some(8)), (&[9, 4], Some(9)), (&[8], None)] {
+            assert!(store(levels).mismatch(side).is_some(), "{levels:?} of {side:?}");
+        }
+        let nothing = RadianceStore { light_field: LightFieldStore::None, ..store(&[]) };
+        assert_eq!(nothing.mismatch(None), None);
+    }
+}

@@ -1,0 +1,154 @@
+//! Points of free air within a volume and the scene's box, with normals in all directions: where an object asks that moves
+//! through the scene.
+//!
+//! A point counts as inside geometry by the rule of the placement: where more than half of what rays around it meet are
+//! backs of single-sided surfaces. Inside solids of double-sided surfaces nothing tells that, and points there count; so do
+//! some in seams, where one solid runs into another and shows its fronts inside of it.
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::visibility_modes::VisibilityMode;
+use crate::light::World;
+use crate::light::contact::Contacts;
+use crate::light::path::PathSettings;
+use crate::light::sampled::RayCount;
+use crate::light::surface::SurfacePoint;
+use crate::math::blocks::{BLOCK, Block};
+use crate::math::random::{Purpose, Random};
+use crate::math::sampling::uniform_sphere;
+use crate::probe::Volume;
+use crate::probe::place::{SettleSettings, Settler};
+use crate::probe::query::{Query, QueryPoint};
+use crate::probe::store::surface::Facing;
+use crate::trace::Ray;
+
+/// Points that are looked for. A share of them is known to 0.8 % (1/√(4·4096)) or better.
+pub const POINTS: u32 = 4096;
+
+/// Places tried for each point. Where nine tenths of the volume are solid, 1 point in 850 finds none.
+const TRIES: u32 = 64;
+
+/// Blocks of paths from each point at most. Their noise is subtracted, and the mean over so many points needs no more.
+const MOST_BLOCKS: u32 = 4;
+
+/// Points of free air and which of their probes they see.
+#[derive(Debug, Clone, Default)]
+pub struct Air {
+    /// They ask with their normal, seen from along it. In volumes that are nearly solid they are fewer than [`POINTS`].
+    pub points: Arc<Vec<QueryPoint>>,
+    /// Bit i: whether the segment to the probe of corner i is unblocked, and the probe active.
+    pub masks: Vec<u8>,
+}
+
+/// The light that arrives at the points by paths, as probes hold it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AirTruth {
+    /// W·m⁻².
+    pub irradiance: Vec<Vec3>,
+    /// Variance of each mean, per channel; `None` from less than two blocks of paths.
+    pub variance: Option<Vec<Vec3>>,
+    /// Independent blocks of paths from each point.
+    pub blocks: u32,
+}
+
+impl Air {
+    /// Looks for points and for what they see.
+    pub fn new(world: &World, query: &Query, seed: u64) -> Air {
+        let points = Arc::new(points(world, query.volume, seed));
+        Air::of(world, query, points)
+    }
+
+    /// Of points that are known.
+    pub fn of(world: &World, query: &Query, points: Arc<Vec<QueryPoint>>) -> Air {
+        let masks = masks(world, query, &points);
+        Air { points, masks }
+    }
+
+    /// Irradiance from the probes at every point, W·m⁻².
+    pub fn irradiance(&self, query: &Query, mode: VisibilityMode) -> Vec<Vec3> {
+        let asked = self.points.par_iter().zip(&self.masks);
+        asked.map(|(point, &mask)| query.irradiance(point, mode.visibility(mask))).collect()
+    }
+
+    /// The truth at the points, by `spp` paths from each, rounded up to whole blocks of sixteen, at most 64.
+    pub fn truth(&self, world: &World, spp: u32, seed: u64) -> AirTruth {
+        let blocks = spp.div_ceil(BLOCK).clamp(1, MOST_BLOCKS);
+        let at = |(index, point): (usize, &QueryPoint)| {
+            let surface = SurfacePoint::in_space(point.position, point.normal);
+            let (mut mean, mut scatter) = (DVec3::ZERO, DVec3::ZERO);
+            for b in 0..blocks {
+                let block = Block::new(seed, Purpose::AirPaths, index as u64, u64::from(b));
+                let path = |i| {
+                    let (settings, mut rays) = (PathSettings::default(), RayCount::default());
+                    let mut numbers = block.sample(i);
+                    world.gather(&surface, point.normal, point.view, &settings, &mut numbers, &mut rays).irradiance
+                };
+                let finite = |e: &Vec3| e.is_finite();
+                let sum: DVec3 = (0..BLOCK).map(path).filter(finite).map(|e| e.as_dvec3()).sum();
+                let delta = sum / f64::from(BLOCK) - mean;
+                mean += delta / f64::from(b + 1);
+                scatter += delta * (sum / f64::from(BLOCK) - mean);
+            }
+            (mean.as_vec3(), (scatter / f64::from((blocks * (blocks - 1)).max(1))).as_vec3())
+        };
+        let (irradiance, variance) = self.points.par_iter().enumerate().map(at).unzip();
+        AirTruth { irradiance, variance: (blocks > 1).then_some(variance), blocks }
+    }
+}
+
+/// Points of free air. They depend on the scene, on the [`bounds`] and on the seed alone.
+pub fn points(world: &World, volume: &Volume, seed: u64) -> Vec<QueryPoint> {
+    (0..POINTS).into_par_iter().filter_map(|index| point(world, volume, seed, index)).collect()
+}
+
+/// The box of the points, relative to the scene's origin: that of the scene as far as the probes' hull covers it. What the
+/// hull has beyond is no air that anything moves through, and volumes that cover the scene share their points. Along axes
+/// in which the scene is flat the hull counts.
+pub fn bounds(world: &World, volume: &Volume) -> (Vec3, Vec3) {
+    /// Spacings.
+    const FLAT: f32 = 1e-3;
+    let hull = volume.grid.hull(0.0);
+    let scene = world.scene.mesh.bounds().unwrap_or(hull);
+    let (mut low, mut high) = (hull.0.max(scene.0), hull.1.min(scene.1));
+    for axis in 0..3 {
+        if high[axis] - low[axis] <= FLAT * volume.grid.spacing_max() {
+            (low[axis], high[axis]) = (hull.0[axis], hull.1[axis]);
+        }
+    }
+    (low, high)
+}
+
+/// The point of an index; `None` where all that is tried lies inside geometry.
+fn point(world: &World, volume: &Volume, seed: u64, index: u32) -> Option<QueryPoint> {
+    let (low, high) = bounds(world, volume);
+    let settings = SettleSettings::default();
+    let settler = Settler { world, grid: &volume.grid, settings: &settings };
+    let mut random = Random::new(seed, Purpose::Air, u64::from(index), 0);
+    let mut place = || {
+        let share = Vec3::new(random.uniform(), random.uniform(), random.uniform());
+        let normal = uniform_sphere(Vec2::new(random.uniform(), random.uniform()));
+        (low + (high - low) * share, normal)
+    };
+    let is_free = |(position, _): &(Vec3, Vec3)| !settler.is_inside(&settler.look(*position));
+    let (position, normal) = (0..TRIES).map(|_| place()).find(is_free)?;
+    Some(QueryPoint { position, normal, geometric: normal, facing: Facing::of(normal), view: normal })
+}
+
+/// Which probes of its cell each point sees. Nothing is in the way but the scene: the point lies on no surface.
+fn masks(world: &World, query: &Query, points: &[QueryPoint]) -> Vec<u8> {
+    let volume = query.volume;
+    let contacts = Contacts::of_points(world.scene, &volume.positions);
+    let mask = |(index, point): (usize, &QueryPoint)| {
+        let corners = volume.grid.corners_around(&query.cell(point));
+        corners.into_iter().enumerate().fold(0, |mask, (i, probe)| {
+            let contact = contacts.of(probe.0 as usize);
+            let target = contact.map_or(volume.position(probe), |contact| contact.target(point.position));
+            let sees = || !world.tracer.occluded(Ray::segment(point.position, target, index as u32));
+            mask | u8::from(volume.is_active(probe) && sees()) << i
+        })
+    };
+    points.par_iter().enumerate().map(mask).collect()
+}

@@ -1,0 +1,99 @@
+//! Figures of the air, what objects get that move: where the light is known, and where geometry is.
+
+use glam::Vec3;
+use lightprobe::light::World;
+use lightprobe::probe::file;
+use lightprobe::probe::query::Query;
+use lightprobe::scene::{self, LoadOptions};
+use lightprobe::shade::air::{Air, POINTS};
+use serde_json::Value;
+
+use crate::common::Folder;
+use crate::program::{bake, method, render, scene};
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+/// In a closed room whose walls are all equally bright, every point of the air gets πLe/(1 − ρ).
+#[test]
+fn the_air_of_a_furnace_is_evenly_lit() {
+    let folder = Folder::new();
+    // Objects in the air want the probes of the corners too, which surfaces can do without.
+    let format =
+        "--set store.irradiance.octahedral.format=f32 --set grid.spacing_m=0.5 --set placement.keep_unsampled=true";
+    let baked = bake(&folder, &scene("furnace"), format);
+    let report = render(&folder, &scene("furnace"), &baked.path, "run", "--size 16x9 --reference 64");
+    for name in ["visibility_off", "visibility_on", "visibility_ray"] {
+        let air = &method(&report, name)["air"];
+        assert_eq!((&air["points"], &air["black"], &air["unseen"]), (&POINTS.into(), &0.0.into(), &0.0.into()));
+        assert!(number(&air["leak_light"]) < 1e-5 && number(&air["leak_dark"]) < 1e-5, "{air}");
+        // 64 paths know each point to some 10 %; what is left of that in the mean of 4096 squares is a standard error.
+        let (error, bar) = (number(&air["error"]), number(&air["standard_error"]["error"]));
+        assert!(error < 0.02 && error < 5.0 * bar + 2e-3, "{air}");
+    }
+    let without = render(&folder, &scene("furnace"), &baked.path, "without", "--size 16x9");
+    assert!(method(&without, "visibility_on")["air"]["error"].is_null());
+}
+
+/// Walls are solids of at least 0.09 m around and between two rooms of 4 m; the one in the middle is complete. Where solids
+/// run into each other, half of what a point inside sees is the front of the other one, and nothing is said about it.
+#[test]
+fn points_lie_in_the_rooms_and_see_the_probes_of_their_own() {
+    let folder = Folder::new();
+    let baked = bake(&folder, &scene("two_rooms_sealed"), "--set grid.spacing_m=1");
+    let loaded = scene::load(&scene("two_rooms_sealed"), &LoadOptions::default()).unwrap();
+    let world = World::new(&loaded, 1.0, 0.999).unwrap();
+    let probes = file::read(&baked.path).unwrap();
+    let volume = probes.volume_as_planned(loaded.origin_world);
+    let query = Query { volume: &volume, settings: &probes.query.weights };
+    let origin = loaded.origin_world.as_vec3();
+    let air = Air::new(&world, &query, 0);
+    assert_eq!((air.points.len(), air.masks.len()), (POINTS as usize, POINTS as usize));
+    let (mut left, mut normals) = (0usize, Vec3::ZERO);
+    for (point, mask) in air.points.iter().zip(&air.masks) {
+        let p = point.position + origin;
+        // Beyond the inner faces by more than rounding, and before the outer ones; a wall's thickness off its neighbours.
+        let depth = [p.x.abs() - 4.05, (p.y - 1.5).abs() - 1.5, p.z.abs() - 2.0];
+        let beside = |axis: usize| (0..3).filter(|&other| other != axis).all(|other| depth[other] < -0.1);
+        let in_wall = |axis: usize| (1e-3..0.089).contains(&depth[axis]) && beside(axis) && p.x.abs() > 0.15;
+        let in_divider = p.x.abs() < 0.049 && beside(0);
+        assert!(!in_divider && !(0..3).any(in_wall), "{p}");
+        left += usize::from(p.x < 0.0);
+        normals += point.normal;
+        for (i, probe) in volume.grid.corners_around(&query.cell(point)).into_iter().enumerate() {
+            let other_room = (volume.position(probe) + origin).x * p.x < 0.0;
+            assert!(mask >> i & 1 == 0 || !other_room, "{p} sees through the wall");
+        }
+    }
+    // Rooms of equal size: a half each, five deviations of 0.0078; the mean normal is 0 to five of 0.009 along each axis.
+    assert!((left as f64 / f64::from(POINTS) - 0.5).abs() < 0.039, "{left}");
+    assert!((normals / POINTS as f32).abs().max_element() < 0.045, "{normals}");
+    // The same for any probes that cover the scene, and others with another seed.
+    let finer = bake(&folder, &scene("two_rooms_sealed"), "--set grid.spacing_m=1.5");
+    let finer = file::read(&finer.path).unwrap().volume_as_planned(loaded.origin_world);
+    let again = Air::new(&world, &Query { volume: &finer, settings: &probes.query.weights }, 0);
+    assert!(air.points.iter().zip(again.points.iter()).all(|(a, b)| a.position == b.position && a.normal == b.normal));
+    assert_ne!(Air::new(&world, &query, 1).points[0].position, air.points[0].position);
+}
+
+#[test]
+fn light_leaks_into_the_air_without_visibility() {
+    let folder = Folder::new();
+    let baked = bake(&folder, &scene("two_rooms_open"), "--set grid.spacing_m=1");
+    let run = |name: &str, threads: u32| {
+        let words = format!("--size 16x9 --reference 32 --threads {threads}");
+        render(&folder, &scene("two_rooms_open"), &baked.path, name, &words)
+    };
+    let report = run("two", 2);
+    let air = |name: &str| &method(&report, name)["air"];
+    assert!(number(&air("visibility_off")["leak_light"]) > 0.005, "{}", air("visibility_off"));
+    let exact = air("visibility_ray");
+    assert_eq!((&exact["leak_light"], &exact["leak_dark"]), (&0.0.into(), &0.0.into()));
+    // Interpolation errs, and leaks add to it.
+    assert!(number(&exact["error"]) < number(&air("visibility_off")["error"]), "{report}");
+    let one = run("one", 1);
+    for name in ["visibility_off", "visibility_on", "visibility_ray"] {
+        assert_eq!(&method(&one, name)["air"], air(name), "{name}");
+    }
+}

@@ -68,7 +68,8 @@ fn points(scene: &Scene) -> Vec<QueryPoint> {
         let (u, v) = (spread(0.754_878).sqrt(), spread(0.569_840));
         let position = corners[0] * (1.0 - u) + (corners[1] * (1.0 - v) + corners[2] * v) * u;
         let normal = mesh.geometric_normal(triangle);
-        QueryPoint { position, normal, facing: Facing::of(normal), view: (Vec3::Y - position).normalize_or_zero() }
+        let view = (Vec3::Y - position).normalize_or_zero();
+        QueryPoint { position, normal, geometric: normal, facing: Facing::of(normal), view }
     };
     (0..POINTS).map(point).collect()
 }
@@ -99,6 +100,7 @@ fn filter_and_bounce(criterion: &mut Criterion) {
         settings: &config.capture,
         distance_clamp_m: None,
         hit_light: config.transport.hit_light(),
+        keeps_geometric: false,
         sees: false,
         resampling: None,
         seed: 1,

@@ -39,6 +39,8 @@ class Probes:
         if "query" in self.meta:  # older files say it in their configuration
             self.check_weights(json.loads(self.meta["query"])["weights"])
         grid = json.loads(self.meta["grid"])
+        if grid["kind"] != "uniform" or "irradiance" not in self.tensors:
+            sys.exit("this script knows uniform grids of irradiance maps only")
         self.origin, self.spacing = np.array(grid["origin"]), np.array(grid["spacing"], np.float32)
         self.divisions, self.border = np.array(grid["divisions"]), grid["border"]
         self.cells = np.maximum(self.divisions - 1, 1)
@@ -48,7 +50,8 @@ class Probes:
         """Refuses files that are asked in another way than this script asks."""
         plain = {"direction": "uniform", "blend": "linear", "trilinear_floor": 0.0, "weight_floor": 0.0}
         plain |= {"crush_below": 0.0, "normal_bias": 0.0, "view_bias": 0.0}
-        other = [key for key, value in plain.items() if weights[key] != value]
+        plain |= {"look_up": "normal"}
+        other = [key for key, value in plain.items() if weights.get(key, value) != value]
         if weights["test"] != "none":
             if "table" in weights["test"]:
                 table = weights["test"]["table"]

@@ -61,9 +61,10 @@ pub fn gather<'p>(
 ) -> (Budgeted<'p>, Occlusion) {
     let config = prepared.config;
     let probes = prepared.grid.probe_count();
-    let active = if config.transport.captures_once() { prepared.active() } else { Vec::new() };
     let mut stored: Vec<Option<ProbeCapture>> = (0..probes).map(|_| None).collect();
     let mut occlusion = prepared.occlusion_builder();
+    let once = config.transport.captures_once();
+    let active = if once || occlusion.has_rays() { prepared.active() } else { Vec::new() };
     let at_once = (CHUNK_BYTES / surfels_bytes(config).max(1)) as usize;
     let at_once = at_once.clamp(rayon::current_num_threads().min(CHUNK), CHUNK);
     let (mut rays, mut outside, mut non_finite, mut light_clamped, mut bytes) = ((0, 0), 0, 0, 0, 0);
@@ -76,8 +77,11 @@ pub fn gather<'p>(
                 let traced: Vec<(ProbeCapture, Vec<Vec2>)> = chunk
                     .par_iter()
                     .map(|&probe| {
-                        let mut capture = prepared.trace(capture, probe);
-                        let filtered = occlusion.filter(&std::mem::take(&mut capture.distances));
+                        let mut capture = match once {
+                            true => prepared.trace(capture, probe),
+                            false => ProbeCapture::default(),
+                        };
+                        let filtered = prepared.look(&occlusion, probe, &mut capture);
                         bar.inc(1);
                         (capture, filtered)
                     })
@@ -90,7 +94,7 @@ pub fn gather<'p>(
                     light_clamped += capture.light_clamped;
                     occlusion.set(probe, &filtered);
                     bytes += capture.bytes();
-                    if circumstances.memory_budget_bytes.is_none_or(|budget| bytes <= budget) {
+                    if once && circumstances.memory_budget_bytes.is_none_or(|budget| bytes <= budget) {
                         stored[probe] = Some(capture);
                     }
                 }

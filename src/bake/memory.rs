@@ -4,10 +4,9 @@
 use super::circumstances::BakeError;
 use crate::config::Config;
 use crate::probe::Grid;
-use crate::probe::capture::surfel::Surfel;
+use crate::probe::capture::surfel::{PackedNormal, Surfel};
 use crate::probe::capture::{ProbeCapture, Seen};
 use crate::probe::place::survey;
-use crate::probe::store::kernel::Kernel;
 use crate::probe::store::radiance::LightFieldStore;
 use crate::probe::transport::anderson::History;
 use crate::scene::{Mesh, Scene};
@@ -55,7 +54,7 @@ impl Memory {
         Memory {
             probes: probes * PROBE_BYTES,
             survey: survey.map_or(0, |voxels| survey::estimated_bytes(mesh, grid, voxels)),
-            kernels: Kernel::bytes(texels, unknowns, 1.0) + distance_kernel + resampling,
+            kernels: store.irradiance.filter_bytes(texels) + distance_kernel + resampling,
             maps: probes * per_probe + history,
             in_flight: (surfels_bytes(config) + distances + resampled) * rayon::current_num_threads() as u64,
         }
@@ -110,7 +109,7 @@ impl Memory {
 /// # Errors
 /// [`BakeError::Grid`], [`BakeError::Memory`].
 pub fn check(config: &Config, scene: &Scene) -> Result<(), BakeError> {
-    let grid = Grid::new(&config.grid, scene)?;
+    let grid = Grid::refined(&config.grid, config.placement.refine, scene)?;
     Ok(Memory::of(config, &grid, &scene.mesh).check(config, 0)?)
 }
 
@@ -120,7 +119,7 @@ pub fn check(config: &Config, scene: &Scene) -> Result<(), BakeError> {
 /// # Errors
 /// [`BakeError::Grid`].
 pub fn surely_fits(config: &Config, scene: &Scene) -> Result<bool, BakeError> {
-    let grid = Grid::new(&config.grid, scene)?;
+    let grid = Grid::refined(&config.grid, config.placement.refine, scene)?;
     let kept = if config.transport.captures_once() { surfels_bytes(config) } else { 0 };
     let captures = (grid.probe_count() as u64).saturating_mul(kept);
     Ok(Memory::of(config, &grid, &scene.mesh).check(config, captures).is_ok())
@@ -128,6 +127,7 @@ pub fn surely_fits(config: &Config, scene: &Scene) -> Result<bool, BakeError> {
 
 /// Most that one probe's captured surfaces can take.
 pub fn surfels_bytes(config: &Config) -> u64 {
+    let geometric = if config.query.needs_geometric() { size_of::<PackedNormal>() as u64 } else { 0 };
     let seen = if config.store.light_field == LightFieldStore::None { 0 } else { size_of::<Seen>() as u64 };
-    config.capture.rays.kept() as u64 * SURFEL_BYTES + config.capture.rays.texels() as u64 * seen
+    config.capture.rays.kept() as u64 * (SURFEL_BYTES + geometric) + config.capture.rays.texels() as u64 * seen
 }

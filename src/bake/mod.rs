@@ -3,10 +3,16 @@
 //! `bake` runs it once; whatever compares configurations runs it many times on one [`World`](crate::light::World).
 
 mod circumstances;
+#[cfg(test)]
+#[path = "../../tests/common/mod.rs"]
+mod common;
+pub mod convert;
 pub mod figures;
 mod gather;
 mod log;
 mod memory;
+#[cfg(test)]
+mod mixed_tests;
 mod pipeline;
 mod predict;
 mod prepared;

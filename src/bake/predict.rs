@@ -72,8 +72,7 @@ impl Prepared<'_, '_> {
                 false => self.frame(&capture, probe, 0),
             };
             // Filtered at once, and not kept.
-            let distances = std::mem::take(&mut captured.distances);
-            std::hint::black_box(occlusion.filter(&distances));
+            std::hint::black_box(self.look(&occlusion, probe, &mut captured));
             captured
         };
         let traced: Vec<ProbeCapture> = pilot.par_iter().map(trace).collect();

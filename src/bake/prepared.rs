@@ -1,8 +1,9 @@
 //! Everything that is decided before captures are traced.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::circumstances::{BakeError, Circumstances};
+use super::convert;
 use super::log::Log;
 use super::memory::Memory;
 use crate::config::{Config, VISIBILITY};
@@ -16,7 +17,7 @@ use crate::probe::store::kernel::Kernel;
 use crate::probe::store::occlusion::OcclusionBuilder;
 use crate::probe::store::radiance::{LightFieldStore, RadianceStore};
 use crate::probe::store::{Occlusion, OcclusionStore};
-use crate::probe::{Grid, Volume};
+use crate::probe::{Grid, ProbeIndex, Volume};
 
 /// Hits this far outside the hull of the probes, in spacings, still count as inside: rounding of the bounds.
 const HULL_TOLERANCE: f32 = 1e-3;
@@ -49,7 +50,7 @@ pub fn prepare<'w, 's>(
     circumstances: &Circumstances,
 ) -> Result<Prepared<'w, 's>, BakeError> {
     let mut log = Log::new(circumstances.progress);
-    let grid = Grid::new(&config.grid, world.scene)?;
+    let grid = Grid::refined(&config.grid, config.placement.refine, world.scene)?;
     let memory = Memory::of(config, &grid, &world.scene.mesh);
     memory.check(config, 0)?;
     let keep_unsampled = config.placement.keep_unsampled || config.plan.keeps("unused_probes");
@@ -81,6 +82,7 @@ impl Prepared<'_, '_> {
             settings: &self.capture,
             distance_clamp_m: clamp.map(|diagonals| diagonals * self.grid.spacing().length()),
             hit_light: self.config.transport.hit_light(),
+            keeps_geometric: self.config.query.needs_geometric(),
             sees: self.config.store.light_field != LightFieldStore::None,
             resampling: self.resampling.as_ref(),
             seed: circumstances.seed,
@@ -94,10 +96,10 @@ impl Prepared<'_, '_> {
 
     /// What collects occlusion while probes are captured.
     pub(super) fn occlusion_builder(&self) -> OcclusionBuilder {
-        let (store, probes) = (&self.config.store, self.grid.probe_count());
+        let store = &self.config.store;
         let occlusion = if self.stores_occlusion() { &store.occlusion } else { &OcclusionStore::None };
         let directions = self.capture.rays.directions();
-        occlusion.builder(self.placement.survey.as_ref(), &directions, probes, store.border)
+        occlusion.builder(self.placement.survey.as_ref(), &directions, &self.grid, store.border)
     }
 
     pub(super) fn active(&self) -> Vec<usize> {
@@ -107,12 +109,33 @@ impl Prepared<'_, '_> {
 
     /// Traces one active probe.
     pub(super) fn trace(&self, capture: &Capture, probe: usize) -> ProbeCapture {
-        capture.probe(probe, self.viewpoint(probe), |p| self.contains(p))
+        let (capture, stream) = self.at(capture, probe);
+        capture.probe(stream, self.viewpoint(probe), |p| self.contains(p))
     }
 
     /// Traces one frame of an active probe.
     pub(super) fn frame(&self, capture: &Capture, probe: usize, frame: u32) -> ProbeCapture {
-        capture.frame(probe, self.viewpoint(probe), |p| self.contains(p), frame)
+        let (capture, stream) = self.at(capture, probe);
+        capture.frame(stream, self.viewpoint(probe), |p| self.contains(p), frame)
+    }
+
+    /// A probe's own capture, and what numbers its random sequences.
+    fn at<'c>(&self, capture: &Capture<'c, 'c>, probe: usize) -> (Capture<'c, 'c>, usize) {
+        let index = ProbeIndex(probe as u32);
+        // A probe that stands for a larger cell must know distances as much farther.
+        let farther = self.grid.width(index) as f32;
+        let capture = Capture { distance_clamp_m: capture.distance_clamp_m.map(|m| m * farther), ..*capture };
+        (capture, self.grid.stream(index) as usize)
+    }
+
+    /// What a probe's occlusion keeps of distances: those of its capture, which lets go of them, or of rays of their own.
+    pub(super) fn look(&self, occlusion: &OcclusionBuilder, probe: usize, captured: &mut ProbeCapture) -> Vec<Vec2> {
+        let mut distances = std::mem::take(&mut captured.distances);
+        if occlusion.has_rays() {
+            distances = convert::distances(self.world, occlusion, probe, self.viewpoint(probe));
+            captured.rays.primary += distances.len() as u64;
+        }
+        occlusion.filter(probe, &distances)
     }
 
     /// Where a probe's rays start.
@@ -159,8 +182,9 @@ impl Prepared<'_, '_> {
         let (store, probes) = (&self.config.store, self.grid.probe_count());
         let side = self.capture.rays.side().unwrap_or(0);
         let (field, levels) = store.radiance().runtime_bytes(side, store.layout.g_buffer);
-        let head = store.layout.head_bytes(self.config.placement.rule.moves());
-        let always = (head + store.irradiance.runtime_bytes(store.border) + field) as f64;
+        let moved = self.config.placement.rule.moves();
+        let own = store.layout.head_bytes(moved) + store.irradiance.runtime_bytes(store.border) + field;
+        let always = own as f64 + self.grid.runtime_bytes(moved);
         let survey = self.placement.survey.as_ref();
         let occlusion = store.occlusion.runtime_bytes(store.border, survey, probes, &store.layout);
         let kept_levels = if self.plan.radiance_levels { levels } else { 0 } as f64;

@@ -19,9 +19,6 @@ use crate::probe::transport::solver::{self, Progress as Iterations};
 use crate::probe::transport::{BounceSettings, checkpoint};
 use crate::scene::{self, LoadOptions, Scene};
 
-#[path = "../../tests/common/mod.rs"]
-mod common;
-
 /// Bakes the open rooms coarsely.
 fn bake(checkpoint: Option<Checkpoint>) -> Baked {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/two_rooms_open.glb");

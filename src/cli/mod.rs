@@ -64,6 +64,11 @@ pub enum Command {
     /// folders of these, matched by name. Exits with 0 within thresholds, 1 beyond them, 2 when the sides cannot be
     /// compared.
     DiffReport(DiffArgs),
+    /// Put the probes of a mixed grid on the uniform grid of its finest cells.
+    ///
+    /// Irradiance is copied to every cell that a probe stands for; distances are copied where it stands for one, and traced
+    /// again elsewhere.
+    Convert(ConvertArgs),
     /// Print what a probe file holds, and check its hashes.
     Inspect(InspectArgs),
 }
@@ -314,6 +319,33 @@ pub struct DiffArgs {
     /// the old BASE or the new one; sides that cannot be compared leave it alone.
     #[arg(long)]
     pub update_baseline: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct ConvertArgs {
+    /// Probe file that `bake` wrote.
+    #[arg(value_name = "PROBES")]
+    pub probes: PathBuf,
+    /// Scene that it was baked from: a .glb or .gltf file.
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    #[command(flatten)]
+    pub trace: TraceArgs,
+    /// Probe file to write.
+    #[arg(short, long, value_name = "OUT.probes")]
+    pub output: PathBuf,
+    /// The lattice that the probes are put on.
+    #[arg(long, value_enum)]
+    pub to: LatticeName,
+    /// Convert although the scene has changed since the bake.
+    #[arg(long)]
+    pub allow_scene_change: bool,
+}
+
+/// Lattices by the names of the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum LatticeName {
+    Uniform,
 }
 
 #[derive(Debug, Args)]

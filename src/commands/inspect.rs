@@ -8,8 +8,11 @@ use serde_json::{Value, json};
 
 use super::{Console, tell};
 use crate::cli::InspectArgs;
+use crate::probe::file::published::threev8_bytes;
 use crate::probe::file::{self, FORMAT, ProbeFile};
 use crate::probe::lattice::ProbeState;
+use crate::probe::lattice::tree::Tree;
+use crate::probe::store::tiles::TileStore;
 use crate::probe::{ProbeIndex, Volume};
 use crate::report::table::{Column, Table};
 use crate::system::format;
@@ -45,6 +48,14 @@ fn position_world(volume: &Volume, probe: ProbeIndex) -> [f64; 3] {
     (volume.grid.origin_world() + volume.position(probe).as_dvec3()).to_array()
 }
 
+/// Bytes of the same probes in a published file of their method; `None` where there is none.
+fn published_bytes(volume: &Volume) -> Option<u64> {
+    let tiles = volume.occlusion.tiles().is_some_and(|tiles| tiles.store() == TileStore::default());
+    let subdivided = volume.grid.tree().map(|tree| tree.node_count() as u64);
+    let is_threev8 = tiles && volume.irradiance.signed().is_some();
+    is_threev8.then(|| threev8_bytes(volume.states.len() as u64, subdivided))
+}
+
 fn to_json(file: &ProbeFile, probe: Option<u32>) -> Value {
     let volume = file.volume_in_grid();
     let [active, inside, unsampled] = states(volume);
@@ -61,7 +72,8 @@ fn to_json(file: &ProbeFile, probe: Option<u32>) -> Value {
         "hashes": "match",
         "file_bytes": file.file_bytes,
         "grid": {
-            "kind": "uniform",
+            "kind": if volume.grid.tree().is_some() { "mixed" } else { "uniform" },
+            "levels": volume.grid.tree().map_or(0, Tree::levels),
             "origin": volume.grid.origin_world().to_array(),
             "spacing": volume.grid.spacing().to_array(),
             "divisions": volume.grid.divisions().to_array(),
@@ -74,6 +86,7 @@ fn to_json(file: &ProbeFile, probe: Option<u32>) -> Value {
         "encoding": {"irradiance": volume.irradiance.describe(), "occlusion": volume.occlusion.describe()},
         "query": file.query,
         "tensors": tensors,
+        "published_bytes": published_bytes(volume),
         "scene": file.scene,
         "seed": file.seed,
         "plan": file.plan,
@@ -100,7 +113,7 @@ fn to_text(file: &ProbeFile, probe: Option<u32>) -> String {
     let mut out = format!(
         "{FORMAT}, {}, all hashes match\n\
          scene     {} (BLAKE3 {}), seed {}\n\
-         grid      uniform, {} × {} × {} probes, spacing {} m, origin {} m, border {}\n\
+         grid      {}, spacing {} m, origin {} m, border {}\n\
          probes    {} ({active} active, {inside} inside geometry, {unsampled} never sampled)\n\
          irradiance {}\n\
          occlusion  {}\n\
@@ -109,9 +122,7 @@ fn to_text(file: &ProbeFile, probe: Option<u32>) -> String {
         file.scene.name,
         file.scene.blake3,
         file.seed.map_or_else(|| "not known".to_owned(), |seed| seed.to_string()),
-        grid.divisions().x,
-        grid.divisions().y,
-        grid.divisions().z,
+        grid.describe(),
         grid.spacing(),
         grid.origin_world(),
         file.border,
@@ -134,6 +145,9 @@ fn to_text(file: &ProbeFile, probe: Option<u32>) -> String {
         table.push([name.clone(), dtype.clone(), format!("{shape:?}"), format::bytes(bytes), per_probe]);
     }
     out += &format!("{table}\n");
+    if let Some(bytes) = published_bytes(volume) {
+        out += &format!("the published file of this method would take {}\n", format::bytes(bytes));
+    }
     if let Some(p) = probe {
         let index = ProbeIndex(p);
         let state = serde_json::to_value(volume.states[p as usize]).unwrap_or_default();

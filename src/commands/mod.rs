@@ -2,6 +2,7 @@
 
 pub mod bake;
 mod camera;
+pub mod convert;
 pub mod diff_report;
 pub mod inspect;
 pub mod reference;
@@ -13,9 +14,11 @@ mod tell;
 use std::io::Write;
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 
 use crate::cli::{Cli, Command, OutputFlags, PictureSize};
+use crate::probe::file::ProbeFile;
+use crate::scene::Scene;
 use crate::system::memory::{TooLittleMemory, check_available};
 use crate::system::output::write_atomically;
 use crate::system::progress::Progress;
@@ -86,9 +89,36 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Reference(args) => reference::run(&args, &console)?,
         Command::Sweep(args) => sweep::run(&args, &console)?,
         Command::DiffReport(args) => return diff_report::run(&args, &console),
+        Command::Convert(args) => convert::run(&args, &console)?,
         Command::Inspect(args) => inspect::run(&args, &console)?,
     }
     Ok(Outcome::Done)
+}
+
+/// Whether the scene is another than the probes were baked from; an error unless allowed.
+fn check_scene(
+    probes_path: &Path,
+    probes: &ProbeFile,
+    scene_path: &Path,
+    scene: &Scene,
+    allow_change: bool,
+    console: &Console,
+) -> Result<bool> {
+    if probes.scene.blake3 == scene.blake3 {
+        return Ok(false);
+    }
+    let what = format!(
+        "{} was baked from another scene than {} now is (its files or its sky have changed)",
+        probes_path.display(),
+        scene_path.display()
+    );
+    if !allow_change {
+        bail!(
+            "{what}; bake it again, give the --env, --env-rotate and --env-scale of the bake, or pass --allow-scene-change"
+        );
+    }
+    console.warn(what);
+    Ok(true)
 }
 
 /// Refuses pictures of this size where they take more memory than there is.

@@ -56,9 +56,8 @@ pub fn accel(console: &Console, seconds: f64) {
 
 pub fn prepared(console: &Console, prepared: &Prepared) {
     let grid = &prepared.grid;
-    let [x, y, z] = grid.divisions().to_array();
     let (spacing, origin) = (grid.spacing(), grid.origin_world());
-    console.say(format!("grid: {x} × {y} × {z} probes, spacing {spacing} m, origin {origin} m"));
+    console.say(format!("grid: {}, spacing {spacing} m, origin {origin} m", grid.describe()));
     let placement = &prepared.placement;
     let count = |state| placement.count(state);
     console.say(format!(

@@ -36,6 +36,9 @@ impl Config {
         if transport.needs_gathered_emission() && !capture.gathers_emission() {
             return Some((both, "transport is frames: capture.emission must be gathered".to_owned()));
         }
+        if transport.mixes_samples() && !store.irradiance.is_irradiance() {
+            return Some((both, "transport is frames: store.irradiance must be octahedral".to_owned()));
+        }
         if transport.needs_light_field() && store.light_field == LightFieldStore::None {
             return Some((both, "transport is tracing: store.light_field must be maps".to_owned()));
         }
@@ -48,7 +51,7 @@ impl Config {
             return Some((both, what.to_owned()));
         }
         let (rays, reserved) = (capture.rays.count(), placement.rule.reserved_rays());
-        if capture.rays.side().is_none() && rays <= reserved {
+        if capture.rays.lends_rays() && rays <= reserved {
             let what =
                 format!("capture.rays.fibonacci.count is {rays}: placement.rule keeps {reserved} of them; use more");
             return Some((&["capture", "placement"], what));
@@ -95,6 +98,7 @@ impl Config {
             rule(key, albedo.to_string(), (0.0..=1.0).contains(&albedo), UNIT_RULE);
         }
         rule("store.border", self.store.border.to_string(), self.store.border <= 1, "use 0 or 1");
+        self.placement.refine.check(&mut rule);
         self.placement.rule.check(&mut rule);
         self.placement.survey.check(&mut rule);
         self.capture.check(MAX_RESOLUTION, &mut rule);

@@ -148,7 +148,10 @@ impl Tree {
             return Ok(());
         }
         let has_keys = self.at(path).is_some_and(Value::is_object) || aliases::is_old_section(path);
-        if has_keys && let Some(parts) = below(path, value) {
+        if has_keys
+            && let Some(parts) = below(path, value)
+            && !self.is_whole(path, &parts)
+        {
             return parts.into_iter().try_for_each(|p| self.apply(&part(p), waiting));
         }
         // The settings of a choice that is taken already: those that are not named stay.
@@ -161,6 +164,13 @@ impl Tree {
             }
         }
         self.set(assignment)
+    }
+
+    /// Whether these are all the keys below `path`, none with keys of its own: then they may only fit together.
+    fn is_whole(&self, path: &str, parts: &[(String, String)]) -> bool {
+        let Some(Value::Object(keys)) = self.at(path) else { return false };
+        let is_named = |key: &String| parts.iter().any(|(part, _)| part.strip_prefix(path) == Some(&format!(".{key}")));
+        keys.iter().all(|(key, value)| !value.is_object() && is_named(key)) && parts.len() == keys.len()
     }
 
     /// An old key of a choice that no assignment has taken. Whole files of before name keys of all choices, and those had
@@ -211,7 +221,14 @@ impl Tree {
             // Before JSON makes `null` of NaN and infinities, and so the default of a key that may be left out.
             alone.check(place)?;
         }
-        let parsed = alone.as_ref().ok().and_then(|alone| at(&serde_json::to_value(alone).ok()?, path).cloned());
+        let parsed = match &alone {
+            Ok(alone) => serde_json::to_value(alone).ok().and_then(|alone| at(&alone, path).cloned()),
+            // One key of several that are only there together: the others stand already.
+            Err(error) if matches!(error.code, ron::Error::MissingStructField { .. }) => {
+                ron_options().from_str(value).ok().filter(Value::is_array)
+            }
+            Err(_) => None,
+        };
         set(&mut self.tree, path, parsed.unwrap_or_else(|| plain(value))).map_err(error)?;
         self.config = serde_json::from_value::<Config>(self.tree.clone())
             .map_err(|e| error(explain(&e, alone.as_ref().err(), value)))?;

@@ -35,6 +35,16 @@ pub const PRESETS: &[Preset] = &[
         summary: "light-field probes from cube maps, traced bounces, moments of distance (Luo 2022)",
         text: include_str!("../../configs/presets/lightfield-2022.ron"),
     },
+    Preset {
+        name: "threev8-uniform",
+        summary: "Three.V8 (Fei Yang 2023): spherical harmonics, tiles of distance",
+        text: include_str!("../../configs/presets/threev8-uniform.ron"),
+    },
+    Preset {
+        name: "threev8-mixed",
+        summary: "the same on a grid that is fine only where surfaces are",
+        text: include_str!("../../configs/presets/threev8-mixed.ron"),
+    },
 ];
 
 /// The preset that is no method but what methods are compared with: the truth at the probes.

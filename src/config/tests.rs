@@ -278,6 +278,22 @@ fn choices_need_no_empty_parentheses() {
     }
 }
 
+/// Bounds beside those of before: neither corner alone would do.
+#[test]
+fn a_whole_value_takes_the_place_of_another() {
+    let first = "grid.bounds=(min:(0,0,0),max:(1,1,1))";
+    let far = "grid.bounds=(min: (5, 5, 5), max: (6, 6, 6))";
+    for bounds in [far, "grid.bounds=(max:(6,6,6),min:(5,5,5))", "grid=(bounds: (min: (5, 5, 5), max: (6, 6, 6)))"] {
+        assert_eq!(with(&[first, bounds]).unwrap(), with(&[far]).unwrap(), "{bounds}");
+    }
+    assert_eq!(with(&[far, first]).unwrap(), with(&[first]).unwrap());
+    // A corner alone leaves the other where it is.
+    let config = with(&[first, "grid.bounds=(max:(2,2,2))"]).unwrap();
+    assert_eq!(config.grid.bounds.map(|b| (b.min, b.max)), Some(((0.0, 0.0, 0.0), (2.0, 2.0, 2.0))));
+    assert!(with(&[first, "grid.bounds=(min:(3,0,0),max:(2,2,2))"]).unwrap_err().to_string().contains("grid.bounds"));
+    assert!(with(&[first, "grid.bounds=(min:(0,0,0),max:(2,2,2),mid:(1,1,1))"]).is_err());
+}
+
 #[test]
 fn messages_name_the_place_that_decides() {
     let layers = Layers::default().text("(query: (\n  test: none))", "a.ron").unwrap();
@@ -303,6 +319,12 @@ fn published_layouts_have_their_published_sizes() {
     assert_eq!(bytes("irradiance-2022").iter().sum::<usize>(), 152_832);
     // 192 KiB of what it names, and 576 KiB that its table says.
     assert_eq!(bytes("lightfield-2022"), [0, 65_536, 65_536, 65_536, 0]);
+    // 8² + border of packed colours and 16² + border of two u16; places, levels and the index are the grid's.
+    for name in ["threev8-uniform", "threev8-mixed"] {
+        assert_eq!(bytes(name), [1, 400, 1296, 0, 0]);
+        assert_eq!(preset(name).capture.rays.count(), 6 * 64 * 64);
+        assert_eq!(preset(name).capture.rays.kept(), 6 * 64 * 64);
+    }
     assert_eq!(preset("lightfield-2022").store.layout.published, Some(576 << 10));
 }
 
@@ -316,7 +338,8 @@ fn stages_that_do_not_go_together_are_refused() {
         ("ddgi-2019", &["capture.emission=sampled"][..], "must be gathered"),
         ("ddgi-2019", &["capture.rays.fibonacci.count=32"], "keeps 32 of them"),
         ("ddgi-2019", &["transport=bounces()"], "leave_out"),
-        ("ddgi-2019", &["store.light_field=maps"], "octahedral or cube"),
+        ("ddgi-2019", &["store.irradiance=sh9()"], "store.irradiance must be octahedral"),
+        ("ddgi-2019", &["store.light_field=maps"], "cube with a resolution"),
         ("lightfield-2022", &["store.light_field=none"], "store.light_field must be maps"),
         ("irradiance-2022", &["store.prefiltered=[128, 32]"], "store.prefiltered"),
         ("default", &["capture.rays=cube(sharpness: 0)"], "capture.rays.cube.sharpness"),

@@ -5,6 +5,7 @@ pub mod blocks;
 pub mod box_tree;
 pub mod color;
 pub mod fibonacci;
+pub mod harmonics;
 pub mod octahedral;
 pub mod offset;
 pub mod primaries;

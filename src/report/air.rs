@@ -106,7 +106,13 @@ mod tests {
     use crate::probe::store::surface::Facing;
 
     fn air(masks: &[u8]) -> Air {
-        let point = QueryPoint { position: Vec3::ZERO, normal: Vec3::Y, facing: Facing::of(Vec3::Y), view: Vec3::Y };
+        let point = QueryPoint {
+            position: Vec3::ZERO,
+            normal: Vec3::Y,
+            geometric: Vec3::Y,
+            facing: Facing::of(Vec3::Y),
+            view: Vec3::Y,
+        };
         Air { points: Arc::new(vec![point; masks.len()]), masks: masks.to_vec() }
     }
 

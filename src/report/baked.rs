@@ -55,15 +55,18 @@ fn figures(volume: &Volume, truth: &Truth, without: Option<usize>) -> BakedFigur
     let n = used.len() as f64;
     let (mut difference, mut over, mut under, mut total) = (0.0, 0.0f64, 0.0f64, 0.0);
     for p in 0..volume.states.len() {
-        let texels = truth.runs[0][p].len();
+        let seen = |unknowns: &[Vec3A]| volume.irradiance.along_axes(unknowns).into_owned();
+        let of_runs: Vec<Vec<Vec3A>> = used.iter().map(|&run| seen(&truth.runs[run][p])).collect();
+        let texels = of_runs.first().map_or(0, Vec::len);
+        let of_volume: Vec<Vec3A> = volume.irradiance.probe(p).map(Vec3A::from).collect();
         // Per texel: solid angle, difference, variance of the truth's mean.
         let mut found = Vec::with_capacity(texels);
-        for (o, stored) in volume.irradiance.probe(p).take(texels).enumerate() {
+        for (o, &stored) in seen(&of_volume).iter().take(texels).enumerate() {
             let weight = f64::from(axes[o].1);
             let of = |e: Vec3A| f64::from(luminance(e.into()));
-            let mean = used.iter().map(|&run| of(truth.runs[run][p][o])).sum::<f64>() / n;
-            let spread = used.iter().map(|&run| (of(truth.runs[run][p][o]) - mean).powi(2)).sum::<f64>();
-            found.push((weight, of(stored.into()) - mean, spread / (n * (n - 1.0))));
+            let mean = of_runs.iter().map(|run| of(run[o])).sum::<f64>() / n;
+            let spread = of_runs.iter().map(|run| (of(run[o]) - mean).powi(2)).sum::<f64>();
+            found.push((weight, of(stored) - mean, spread / (n * (n - 1.0))));
             total += weight * mean;
         }
         // Mean squared difference without noise, from all texels of the probe. A single texel would be too noisy.

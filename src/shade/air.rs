@@ -134,7 +134,7 @@ fn point(world: &World, volume: &Volume, seed: u64, index: u32) -> Option<QueryP
     };
     let is_free = |(position, _): &(Vec3, Vec3)| !settler.is_inside(&settler.look(*position));
     let (position, normal) = (0..TRIES).map(|_| place()).find(is_free)?;
-    Some(QueryPoint { position, normal, facing: Facing::of(normal), view: normal })
+    Some(QueryPoint { position, normal, geometric: normal, facing: Facing::of(normal), view: normal })
 }
 
 /// Which probes of its cell each point sees. Nothing is in the way but the scene: the point lies on no surface.

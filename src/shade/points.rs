@@ -85,8 +85,9 @@ pub fn see_pixel(
         let surface = world.surface_at(hit, direction);
         let normal = world.bent_normal(&surface);
         let (irradiance_direct, _) = world.punctual_irradiance(&surface, normal, random.bits());
-        let facing = Facing::of(surface.geometric_normal);
-        let query = QueryPoint { position: surface.position, normal, facing, view: -direction };
+        let geometric = surface.geometric_normal;
+        let (position, facing) = (surface.position, Facing::of(geometric));
+        let query = QueryPoint { position, normal, geometric, facing, view: -direction };
         points.push(ImagePoint { pixel: index, weight, surface, query, depth: hit.t, irradiance_direct });
     }
     (points, sky)

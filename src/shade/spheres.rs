@@ -37,8 +37,9 @@ pub fn draw(scene_picture: &Picture8, view: &View, camera: &Camera, volume: &Vol
         let d = &mut depth[point.pixel as usize];
         *d = d.min(point.depth);
     }
-    let radius = RADIUS * volume.grid.spacing_min();
     for p in 0..volume.states.len() {
+        // Probes of larger cells are drawn larger.
+        let radius = RADIUS * volume.grid.spacing_min() * volume.grid.width(ProbeIndex(p as u32)) as f32;
         let centre = volume.positions[p];
         let Some(Disc { low, high, radius_px }) = disc(camera, centre, radius, width, height) else { continue };
         let rim = RIM_SHARE.min(RIM_PX / radius_px);

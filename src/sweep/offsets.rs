@@ -80,6 +80,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::probe::lattice::Refine;
     use crate::scene::{self, LoadOptions};
 
     fn rooms() -> Scene {
@@ -102,6 +103,30 @@ mod tests {
         }
         assert_eq!(fractions(3, 2), all[..2]);
         assert_ne!(fractions(4, 2), all[..2]);
+    }
+
+    /// The finest points of a mixed grid are those of the shifted uniform one, and as many more as fill its base cells.
+    #[test]
+    fn a_shifted_mixed_grid_keeps_the_shifted_planes() {
+        let scene = rooms();
+        for settings in [
+            GridSettings { spacing_m: Some(1.0), ..Default::default() },
+            GridSettings { divisions: Some((9, 4, 5)), ..Default::default() },
+        ] {
+            let spacing = Grid::new(&settings, &scene).unwrap().spacing().as_dvec3();
+            for fraction in fractions(1, 4) {
+                let moved = shifted(&settings, &scene, fraction).unwrap();
+                let uniform = Grid::new(&moved, &scene).unwrap();
+                let mixed = Grid::refined(&moved, Refine::Mixed { levels: 2 }, &scene).unwrap();
+                assert!((mixed.spacing().as_dvec3() / spacing - 1.0).abs().max_element() < 1e-5);
+                let before = (uniform.origin_world() - mixed.origin_world()) / spacing;
+                // Whole planes on either side.
+                assert!((before - before.round()).abs().max_element() < 1e-3, "{settings:?}: {before}");
+                let (low, more) = (before.round().as_uvec3(), mixed.divisions() - uniform.divisions());
+                assert!(before.min_element() > -1e-3 && low.cmple(more).all() && more.cmplt(UVec3::splat(4)).all());
+                assert_eq!(mixed.divisions() % 4, UVec3::ZERO);
+            }
+        }
     }
 
     #[test]

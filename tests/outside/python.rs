@@ -94,7 +94,8 @@ pub fn the_script_of_the_readme_asks_as_the_tool_does() {
         let query = Query { volume, settings: &file.query.weights };
         for ((position, normal, facing), line) in asked.iter().zip(answers.lines()) {
             let local = (*position - volume.grid.origin_world()).as_vec3();
-            let point = QueryPoint { position: local, normal: *normal, facing: Facing::of(*facing), view: *normal };
+            let (normal, geometric, facing) = (*normal, *facing, Facing::of(*facing));
+            let point = QueryPoint { position: local, normal, geometric, facing, view: normal };
             let own = query.irradiance(&point, Visibility::Stored);
             let found: Vec<f64> = line.split(' ').map(|word| word.parse().unwrap()).collect();
             for (own, found) in own.to_array().into_iter().zip(found) {

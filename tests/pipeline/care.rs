@@ -257,7 +257,7 @@ fn verbose_runs_tell_what_they_do() {
         "configuration: preset default, --set",
         "scene: ",
         "acceleration structure: ",
-        "grid: 3 × 3 × 3",
+        "grid: uniform, 3 × 3 × 3",
         "placement: ",
         "plan: sky left out",
         "capture: ",

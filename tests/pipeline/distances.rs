@@ -135,6 +135,7 @@ fn weight(volume: &Volume, distance: f32) -> f32 {
     let point = QueryPoint {
         position: Vec3::Z * distance,
         normal: Vec3::NEG_Z,
+        geometric: Vec3::NEG_Z,
         facing: Facing::of(Vec3::NEG_Z),
         view: Vec3::NEG_Z,
     };

@@ -24,3 +24,4 @@ mod reference;
 mod reports;
 mod shapes;
 mod skies;
+mod threev8;

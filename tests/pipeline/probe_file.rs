@@ -41,7 +41,7 @@ impl ProbeFile {
             let width = match dtype.as_str() {
                 "U8" => 1,
                 "U16" | "F16" => 2,
-                "U32" | "F32" => 4,
+                "U32" | "I32" | "F32" => 4,
                 other => panic!("tensor {name} is {other}"),
             };
             assert_eq!(to - from, width * shape.iter().product::<usize>(), "size of tensor {name}");

@@ -184,7 +184,7 @@ impl Seen {
 
 /// Red irradiance that a query gives at a point of a surface, relative to the scene's origin.
 pub fn irradiance_at(query: &Query, position: Vec3, normal: Vec3) -> f64 {
-    let point = QueryPoint { position, normal, facing: Facing::of(normal), view: normal };
+    let point = QueryPoint { position, normal, geometric: normal, facing: Facing::of(normal), view: normal };
     f64::from(query.irradiance(&point, Visibility::Stored).x)
 }
 

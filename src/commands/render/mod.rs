@@ -14,7 +14,7 @@ use self::check::{check_pictures, check_view, pictures};
 use self::reference::{Reference, Shot, Source};
 use super::camera::cameras;
 use super::session::{Opening, Session, inputs};
-use super::{Console, tell, write_json};
+use super::{Console, check_scene, tell, write_json};
 use crate::cli::RenderArgs;
 use crate::config::Config;
 use crate::evaluate::{BakedTruth, Comparison, PATH_RAY, Scenery, Seen, Shaded};
@@ -23,7 +23,7 @@ use crate::probe::Volume;
 use crate::probe::file::{self, ProbeFile};
 use crate::probe::query::Query;
 use crate::report::render::{RenderReport, RenderTimes, SCHEMA};
-use crate::scene::{Camera, Detail, Scene};
+use crate::scene::{Camera, Detail};
 use crate::shade::points::see;
 use crate::shade::visibility_modes::VisibilityMode;
 use crate::system::memory::peak_memory_bytes;
@@ -48,7 +48,8 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
     let reference = Source::of(args)?;
     let probes = file::read(&args.probes)?;
     let session = Session::open(opening(args, &probes), console)?;
-    let scene_changed = check_scene(args, &probes, &session.scene, console)?;
+    let scene_changed =
+        check_scene(&args.probes, &probes, &args.scene, &session.scene, args.allow_scene_change, console)?;
     let (world, accel_build_s) = session.world()?;
     tell::probes(console, &args.probes, &probes);
 
@@ -119,25 +120,6 @@ fn truth(args: &RenderArgs, session: &Session, world: &World, probes: &ProbeFile
     let truth = BakedTruth::trace(world, &config.capture, volume, paths, session.seed, session.console.progress);
     tell::truth(session.console, truth.report.paths_per_hit, truth.report.time_s);
     truth
-}
-
-/// Whether the scene is another than the probes were baked from; an error unless allowed.
-fn check_scene(args: &RenderArgs, probes: &ProbeFile, scene: &Scene, console: &Console) -> Result<bool> {
-    if probes.scene.blake3 == scene.blake3 {
-        return Ok(false);
-    }
-    let what = format!(
-        "{} was baked from another scene than {} now is (its files or its sky have changed)",
-        args.probes.display(),
-        args.scene.display()
-    );
-    if !args.allow_scene_change {
-        bail!(
-            "{what}; bake it again, give the --env, --env-rotate and --env-scale of the bake, or pass --allow-scene-change"
-        );
-    }
-    console.warn(what);
-    Ok(true)
 }
 
 /// A camera's name as the name of a folder.

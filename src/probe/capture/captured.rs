@@ -3,7 +3,7 @@
 use glam::{Vec3, Vec3A};
 
 use super::cube::Resampling;
-use super::surfel::Surfel;
+use super::surfel::{PackedNormal, Surfel};
 use crate::light::sampled::RayCount;
 use crate::math::statistics::Moments;
 use crate::scene::light::LIGHT_MAX;
@@ -41,6 +41,8 @@ pub struct ProbeCapture {
     /// Number of texels.
     pub texels: usize,
     pub surfels: Vec<Surfel>,
+    /// Geometric normals of the surfels, towards the probe; empty where no one asks for them.
+    pub geometric: Vec<PackedNormal>,
     /// Texels in which surfaces or the sky emit, with the radiance, weighted against `emitter_samples`, W·m⁻²·sr⁻¹; a
     /// texel may come more than once.
     pub emitted: Vec<(u32, Vec3)>,
@@ -72,6 +74,7 @@ impl ProbeCapture {
     /// Memory that it takes.
     pub fn bytes(&self) -> u64 {
         (self.surfels.capacity() * size_of::<Surfel>()
+            + self.geometric.capacity() * size_of::<PackedNormal>()
             + self.emitted.capacity() * size_of::<(u32, Vec3)>()
             + self.emitter_samples.capacity() * size_of::<(Vec3, Vec3)>()
             + self.distances.capacity() * size_of::<Moments>()
@@ -108,6 +111,7 @@ impl ProbeCapture {
         let mut out = ProbeCapture {
             texels: kernel.rows(),
             surfels: Vec::with_capacity(kernel.rows()),
+            geometric: Vec::with_capacity(asked(self.geometric.len())),
             distances: vec![Moments::default(); asked(self.distances.len())],
             seen: vec![Seen::default(); asked(self.seen.len())],
             emitter_samples: self.emitter_samples,
@@ -143,6 +147,7 @@ impl ProbeCapture {
             }
             if let Some(surfel) = self.surfels.get(nearest.1 as usize) {
                 out.surfels.push(surfel.in_texel(o as u32, albedo, direct));
+                out.geometric.extend(self.geometric.get(nearest.1 as usize));
             }
         }
         out

@@ -41,6 +41,12 @@ pub fn density(direction: Vec3, face: u32) -> f32 {
     (face * face) as f32 / (4.0 * direction.abs().max_element().powi(3))
 }
 
+/// Directions through the centres of all texels, each with the solid angle of the texel, sr.
+pub fn texels(face: u32) -> Vec<(Vec3, f32)> {
+    let texel = |t| (direction(t, face), 1.0 / density(direction(t, face), face));
+    (0..CUBE_FACES as u32 * face * face).map(texel).collect()
+}
+
 /// The weights from the texels of a cube to those of a map, and the texels beside each.
 #[derive(Debug, Clone)]
 pub struct Resampling {
@@ -114,8 +120,8 @@ impl Resampling {
     }
 }
 
-/// A texel of a cube until it is resampled: a surfel, what was seen of it, its distances, its emission and an index.
-const CUBE_TEXEL_BYTES: u64 = 40 + 20 + 24 + 16 + 4;
+/// A texel of a cube until it is resampled: a surfel with its geometric normal, what was seen of it, its distances, its emission and an index.
+const CUBE_TEXEL_BYTES: u64 = 40 + 4 + 20 + 24 + 16 + 4;
 
 #[cfg(test)]
 mod tests {
@@ -126,11 +132,10 @@ mod tests {
     #[test]
     fn texels_cover_the_sphere() {
         let face = 16;
-        let texels = 6 * face * face;
-        let sum: f32 = (0..texels).map(|t| 1.0 / density(direction(t, face), face)).sum();
+        let sum: f32 = texels(face).iter().map(|(_, solid_angle)| solid_angle).sum();
         // Midpoint rule over squares of 1/8: its error is about 1/8²/24.
         assert!((sum / (4.0 * PI) - 1.0).abs() < 2e-3, "{sum}");
-        let mean = (0..texels).map(|t| direction(t, face)).sum::<Vec3>();
+        let mean = texels(face).iter().map(|(direction, _)| *direction).sum::<Vec3>();
         assert!(mean.length() < 1e-2, "{mean}");
     }
 

@@ -22,7 +22,7 @@ pub use self::captured::{ProbeCapture, Seen};
 pub use self::cube::Resampling;
 pub use self::rays::{CubeRays, FibonacciRays, OctahedralRays, Rays};
 use self::rays::{Pattern, TexelRay};
-use self::surfel::Surfel;
+use self::surfel::{PackedNormal, Surfel};
 use crate::light::World;
 use crate::light::emitters::receiver::Receiver;
 use crate::light::lambert::reflected_radiance;
@@ -102,6 +102,8 @@ pub struct Capture<'w, 's> {
     /// Distances beyond count as this, and so do misses, metres; `None` where no one asks for distances.
     pub distance_clamp_m: Option<f32>,
     pub hit_light: HitLight,
+    /// Whether geometric normals of hits are kept.
+    pub keeps_geometric: bool,
     /// Whether normals and distances of the surfaces are asked for.
     pub sees: bool,
     /// Of [`Rays::resampling`].
@@ -223,6 +225,7 @@ impl Capture<'_, '_> {
             self.sample_emitters(index, centre, &layout, &mut out);
         }
         out.surfels.shrink_to_fit();
+        out.geometric.shrink_to_fit();
         out
     }
 
@@ -300,7 +303,7 @@ impl Capture<'_, '_> {
             out.non_finite += 1;
             direct = Vec3::ZERO;
         }
-        out.surfels.push(Surfel::new(surface, direct, ray.texel, ray.share));
+        self.keep(surface, direct, ray, out);
     }
 
     /// Lights a hit with all light there is and keeps it, as a surface that reflects none of the probes' light.
@@ -324,7 +327,15 @@ impl Capture<'_, '_> {
         out.rays.shadow += u64::from(shadow_rays);
         let irradiance = punctual + (sum / f64::from(paths.max(1))).as_vec3();
         let radiance = reflected_radiance(surface.albedo, out.bounded(irradiance));
-        out.surfels.push(Surfel::new(&SurfacePoint { albedo: Vec3::ZERO, ..*surface }, radiance, ray.texel, ray.share));
+        self.keep(&SurfacePoint { albedo: Vec3::ZERO, ..*surface }, radiance, ray, out);
+    }
+
+    #[inline]
+    fn keep(&self, surface: &SurfacePoint, radiance: Vec3, ray: &TexelRay, out: &mut ProbeCapture) {
+        out.surfels.push(Surfel::new(surface, radiance, ray.texel, ray.share));
+        if self.keeps_geometric {
+            out.geometric.push(PackedNormal::of(surface.geometric_normal));
+        }
     }
 
     /// Draws emitters from the probe's centre.

@@ -19,7 +19,7 @@ pub enum Rays {
     Octahedral(OctahedralRays),
     /// Spherical Fibonacci points: each ray is a texel of its own.
     Fibonacci(FibonacciRays),
-    /// Through the texels of the six faces of a cube, resampled to an octahedral map, see [`super::cube`].
+    /// Through the texels of the six faces of a cube, kept or resampled to an octahedral map, see [`super::cube`].
     Cube(CubeRays),
 }
 
@@ -41,8 +41,8 @@ impl Default for FibonacciRays {
 pub struct CubeRays {
     /// Texels per side of a face.
     pub face: usize,
-    /// Texels per side of the octahedral map.
-    pub resolution: usize,
+    /// Texels per side of the octahedral map; `None`: the cube's own texels are kept.
+    pub resolution: Option<usize>,
     /// Exponent k of the weights max(0, d·d′)^k by which texels of the cube count for one of the map.
     pub sharpness: f32,
 }
@@ -52,7 +52,7 @@ impl Default for CubeRays {
     /// texels, up to Δ = 0.036 rad wide, are the same wherever a small lamp lies, up to 2·exp(−2π²/(k·Δ²)) = 0.1 %; at 4096
     /// it would be 5 %.
     fn default() -> Self {
-        CubeRays { face: 256, resolution: 128, sharpness: 2048.0 }
+        CubeRays { face: 256, resolution: Some(128), sharpness: 2048.0 }
     }
 }
 
@@ -83,7 +83,7 @@ impl Rays {
         match self {
             Rays::Octahedral(rays) => rays.resolution * rays.resolution,
             Rays::Fibonacci(rays) => rays.count,
-            Rays::Cube(rays) => rays.resolution * rays.resolution,
+            Rays::Cube(rays) => rays.resolution.map_or(self.count(), |n| n * n),
         }
     }
 
@@ -106,7 +106,7 @@ impl Rays {
         match self {
             Rays::Octahedral(rays) => Some(rays.resolution),
             Rays::Fibonacci(_) => None,
-            Rays::Cube(rays) => Some(rays.resolution),
+            Rays::Cube(rays) => rays.resolution,
         }
     }
 
@@ -117,7 +117,8 @@ impl Rays {
             Rays::Fibonacci(rays) => {
                 Directions::even((0..rays.count).map(|i| fibonacci::direction(i, rays.count)).collect())
             }
-            Rays::Cube(rays) => Directions::octahedral(rays.resolution),
+            Rays::Cube(CubeRays { resolution: Some(resolution), .. }) => Directions::octahedral(*resolution),
+            Rays::Cube(rays) => Directions::lone(cube::texels(rays.face as u32)),
         }
     }
 
@@ -133,7 +134,7 @@ impl Rays {
 
     /// How texels that were traced become those that are kept; `None` where they are the same.
     pub fn resampling(&self) -> Option<Resampling> {
-        if let Rays::Cube(CubeRays { face, resolution, sharpness }) = self {
+        if let Rays::Cube(CubeRays { face, resolution: Some(resolution), sharpness }) = self {
             Some(Resampling::new(*face, *resolution, *sharpness))
         } else {
             None
@@ -142,7 +143,7 @@ impl Rays {
 
     /// Bytes of [`Self::resampling`], and of what one capture takes before it.
     pub fn resampling_bytes(&self) -> (u64, u64) {
-        if let Rays::Cube(CubeRays { face, resolution, sharpness }) = self {
+        if let Rays::Cube(CubeRays { face, resolution: Some(resolution), sharpness }) = self {
             Resampling::bytes(*face, *resolution, *sharpness)
         } else {
             (0, 0)
@@ -157,6 +158,11 @@ impl Rays {
             }
             Rays::Octahedral(_) | Rays::Cube(_) => self.clone(),
         }
+    }
+
+    /// Whether placement may keep some of them for itself.
+    pub fn lends_rays(&self) -> bool {
+        matches!(self, Rays::Fibonacci(_))
     }
 
     /// The key that makes captures larger.
@@ -178,7 +184,7 @@ impl Rays {
             Rays::Fibonacci(rays) => Rays::Fibonacci(FibonacciRays { count: (4 * rays.count).min(MOST_FIBONACCI) }),
             Rays::Cube(rays) => Rays::Cube(CubeRays {
                 face: twice(rays.face),
-                resolution: twice(rays.resolution),
+                resolution: rays.resolution.map(twice),
                 sharpness: (4.0 * rays.sharpness).min(MOST_SHARPNESS),
             }),
         }
@@ -198,8 +204,10 @@ impl Rays {
             }
             Rays::Cube(CubeRays { face, resolution, sharpness }) => {
                 rule(self.size_key(), face.to_string(), (1..=most_texels).contains(face), texels);
-                let holds = (1..=most_texels).contains(resolution);
-                rule("capture.rays.cube.resolution", resolution.to_string(), holds, texels);
+                if let Some(n) = resolution {
+                    let holds = (1..=most_texels).contains(n);
+                    rule("capture.rays.cube.resolution", n.to_string(), holds, "use 1 to 1024 texels, or None");
+                }
                 let holds = (1.0..=MOST_SHARPNESS).contains(sharpness);
                 rule("capture.rays.cube.sharpness", sharpness.to_string(), holds, "use 1 to 1e7");
             }

@@ -18,8 +18,8 @@ pub struct Surfel {
     /// B⁰: radiance reflected from light that did not pass through probes, times the share, W·m⁻²·sr⁻¹.
     pub direct_radiance: Vec3,
     pub texel: u32,
-    /// `oct` of the shading normal, towards the probe, in units of 1/[`NORMAL_SCALE`].
-    oct: [i16; 2],
+    /// Shading normal, towards the probe.
+    normal: PackedNormal,
     /// Albedo times the share, in units of 1/[`ALBEDO_SCALE`].
     albedo: [u16; 3],
     /// Main direction of the geometric normal, towards the probe.
@@ -28,6 +28,23 @@ pub struct Surfel {
 
 /// Steps of 1/32767 in `oct` are at most 10⁻⁴ rad: a thousandth of a texel of the maps that are asked.
 const NORMAL_SCALE: f32 = i16::MAX as f32;
+
+/// The `oct` of a normal in units of 1/[`NORMAL_SCALE`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PackedNormal([i16; 2]);
+
+impl PackedNormal {
+    pub fn of(normal: Vec3) -> PackedNormal {
+        let oct = oct_from_direction(normal) * NORMAL_SCALE;
+        // Adding a half before truncation rounds.
+        PackedNormal([oct.x, oct.y].map(|x| (x + 0.5f32.copysign(x)) as i16))
+    }
+
+    #[inline]
+    pub fn oct(self) -> Vec2 {
+        Vec2::new(f32::from(self.0[0]), f32::from(self.0[1])) * (1.0 / NORMAL_SCALE)
+    }
+}
 
 /// Steps of 1/65535, rounded up or down by [`dither`]: at an albedo of 0.999 a bounce that is always too weak by half a step
 /// would lose 0.7 % of all light.
@@ -46,14 +63,13 @@ const _: () = assert!(size_of::<Surfel>() == 40);
 
 impl Surfel {
     pub fn new(surface: &SurfacePoint, direct_radiance: Vec3, texel: u32, share: f32) -> Surfel {
-        // Adding a half before truncation rounds; the albedo is dithered instead.
-        let oct = oct_from_direction(surface.shading_normal) * NORMAL_SCALE;
+        // Truncated after dithering.
         let albedo = surface.albedo * (share * ALBEDO_SCALE) + dither(texel);
         Surfel {
             position: surface.position,
             direct_radiance: direct_radiance * share,
             texel,
-            oct: [oct.x, oct.y].map(|x| (x + 0.5f32.copysign(x)) as i16),
+            normal: PackedNormal::of(surface.shading_normal),
             albedo: [albedo.x as u16, albedo.y as u16, albedo.z as u16],
             facing: Facing::of(surface.geometric_normal),
         }
@@ -62,7 +78,7 @@ impl Surfel {
     /// `oct` of the shading normal.
     #[inline]
     pub fn oct(&self) -> Vec2 {
-        Vec2::new(f32::from(self.oct[0]), f32::from(self.oct[1])) * (1.0 / NORMAL_SCALE)
+        self.normal.oct()
     }
 
     /// Albedo times the share.

@@ -24,7 +24,16 @@ fn capture<'a>(
     resampling: Option<&'a Resampling>,
 ) -> Capture<'a, 'a> {
     let hit_light = HitLight::Direct;
-    Capture { world, settings, distance_clamp_m: Some(10.0), hit_light, sees: true, resampling, seed: 1 }
+    Capture {
+        world,
+        settings,
+        distance_clamp_m: Some(10.0),
+        hit_light,
+        keeps_geometric: true,
+        sees: true,
+        resampling,
+        seed: 1,
+    }
 }
 
 fn octahedral(resolution: usize, per_texel: usize) -> Rays {
@@ -49,8 +58,20 @@ fn map_and_cube(name: &str) -> [ProbeCapture; 2] {
     let position = low + (high - low) * Vec3::new(0.45, 0.6, 0.55);
     let fine = settings(octahedral(N, 64));
     let map = capture(&world, &fine, None).probe(0, position, |_| true);
+<<<<<<< HEAD
+    // A lobe of 1/√128 = 0.09 rad against the map's texels as in the preset.
+    let rays = Rays::Cube(CubeRays { face: 128, resolution: Some(n), sharpness: 128.0 });
+    let resampling = rays.resampling().unwrap();
+    let coarse = settings(rays.clone());
+||||||| 65ec702
+    // A lobe of 1/√128 = 0.09 rad against the map's texels as in the preset.
+    let rays = Rays::Cube(CubeRays { face: 128, resolution: n, sharpness: 128.0 });
+    let resampling = rays.resampling().unwrap();
+    let coarse = settings(rays.clone());
+=======
     let rays = Rays::Cube(CubeRays { face: 128, resolution: N, sharpness: 128.0 });
     let (resampling, coarse) = (rays.resampling().unwrap(), settings(rays.clone()));
+>>>>>>> 278cdb2954b556ecd57accc1c8a4faa422507d3e
     let cube = capture(&world, &coarse, Some(&resampling)).probe(0, position, |_| true);
     assert_eq!((cube.texels, cube.rays.primary), (N * N, rays.count() as u64));
     [map, cube]
@@ -107,6 +128,47 @@ fn cubes_and_octahedral_maps_see_the_same_walls() {
     assert!(flat > N * N / 4, "{flat} flat texels");
 }
 
+/// The texels of a cube that is not resampled are kept with their solid angles: a filter makes of them what it makes of a fine
+/// octahedral map, and of one radiance exactly π times it.
+#[test]
+fn cubes_are_kept_as_they_are() {
+    let scene = scene("cornell");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let (low, high) = scene.mesh.bounds().unwrap();
+    let position = low + (high - low) * Vec3::new(0.45, 0.6, 0.55);
+    let fine = settings(octahedral(64, 16));
+    let rays = Rays::Cube(CubeRays { face: 256, resolution: None, ..Default::default() });
+    assert!(rays.resampling().is_none() && rays.side().is_none());
+    assert_eq!((rays.texels(), rays.kept()), (rays.count(), 6 * 256 * 256));
+    let plain = settings(rays.clone());
+    let map = capture(&world, &fine, None).probe(0, position, |_| true);
+    let cube = capture(&world, &plain, None).probe(0, position, |_| true);
+    assert_eq!((cube.texels, cube.geometric.len()), (rays.count(), cube.surfels.len()));
+    let filtered = |rays: &Rays, radiance: &[Vec3A]| {
+        let mut out = vec![Vec3A::ZERO; 9];
+        Kernel::harmonics(&rays.directions()).irradiance(radiance, &mut out);
+        out
+    };
+    let even = filtered(&rays, &vec![Vec3A::ONE; cube.texels]);
+    // Rounding of sums of 400,000 f32, in four lanes.
+    assert!((even[0].x / PI - 1.0).abs() < 1e-4 && even[1..].iter().all(|e| e.x.abs() < 1e-4), "{even:?}");
+    let albedo = |captured: &ProbeCapture| {
+        let mut albedo = vec![Vec3A::ZERO; captured.texels];
+        captured.surfels.iter().for_each(|s| albedo[s.texel as usize] += Vec3A::from(s.albedo()));
+        albedo
+    };
+    for (what, a, b) in
+        [("emission", map.emitted_radiance(), cube.emitted_radiance()), ("albedo", albedo(&map), albedo(&cube))]
+    {
+        let (a, b) = (filtered(&fine.rays, &a), filtered(&rays, &b));
+        let largest = a.iter().copied().fold(Vec3A::ZERO, Vec3A::max).max_element();
+        for (a, b) in a.iter().zip(&b) {
+            // Edges of the lamp run along rows of the cube, which are in or out as a whole: it has about sixty each way.
+            assert!((*a - *b).abs().max_element() < 0.03 * largest, "{what}: {a} {b}");
+        }
+    }
+}
+
 /// Surfels of a resampled cube stand on surfaces.
 #[test]
 fn resampled_hits_lie_on_surfaces() {
@@ -114,14 +176,16 @@ fn resampled_hits_lie_on_surfaces() {
     let world = World::new(&scene, 1.0, 0.999).unwrap();
     let (low, high) = scene.mesh.bounds().unwrap();
     let position = 0.5 * (low + high);
-    let rays = Rays::Cube(CubeRays { face: 32, resolution: 16, sharpness: 64.0 });
+    let rays = Rays::Cube(CubeRays { face: 32, resolution: Some(16), sharpness: 64.0 });
     let (resampling, settings) = (rays.resampling().unwrap(), settings(rays));
     let found = capture(&world, &settings, Some(&resampling)).probe(0, position, |_| true);
     assert!(found.surfels.len() > 200);
-    for surfel in &found.surfels {
+    assert_eq!(found.geometric.len(), found.surfels.len());
+    for (surfel, geometric) in found.surfels.iter().zip(&found.geometric) {
         let hit = world.surface(Ray::new(position, (surfel.position - position).normalize(), 0)).unwrap();
         // Rounding of a ray of some metres.
         assert!((hit.hit.t - surfel.position.distance(position)).abs() < 1e-4, "{}", surfel.position);
+        assert_eq!(*geometric, PackedNormal::of(hit.geometric_normal));
     }
 }
 

@@ -5,7 +5,7 @@ use ron::extensions::Extensions;
 use serde::Deserialize;
 
 use super::record::{LightRecord, QUERY_VERSION, QueryRecord};
-use crate::probe::query::{BiasSpacing, Blend, DirectionWeight, QuerySettings, VisibilityTest};
+use crate::probe::query::{BiasSpacing, Blend, DirectionWeight, LookUp, QuerySettings, VisibilityTest, WeightNormal};
 use crate::probe::store::surface::TableTest;
 use crate::scene::Unassigned;
 
@@ -136,6 +136,7 @@ pub fn query(config: &str) -> Result<QueryRecord, String> {
                 OldDirection::Cosine { floor } => DirectionWeight::Cosine { floor },
                 OldDirection::Wrap { offset } => DirectionWeight::Wrap { offset },
             },
+            weight_normal: WeightNormal::Shading,
             test,
             trilinear_floor: q.trilinear_floor,
             weight_floor: q.weight_floor,
@@ -150,6 +151,7 @@ pub fn query(config: &str) -> Result<QueryRecord, String> {
             bias_spacing: BiasSpacing::Largest,
             distance_bias: 0.0,
             blank_below: 0.0,
+            look_up: LookUp::Normal,
         },
         moved: old.placement.relocate,
         light: LightRecord {

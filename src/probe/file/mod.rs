@@ -4,6 +4,7 @@
 //! comes from, and nothing reads it to shade. Files without `query` are older: [`legacy`] derives it once from `config`.
 
 pub mod legacy;
+pub mod published;
 mod record;
 #[cfg(test)]
 mod tests;
@@ -17,11 +18,15 @@ use serde_json::Value;
 
 pub use self::record::{GridKind, GridRecord, LightRecord, QUERY_VERSION, QueryRecord, SceneRecord};
 use super::container::{Container, EncodingLosses, FileError};
+use super::lattice::tree::Tree;
 use super::lattice::{Grid, ProbeState};
 use super::store::layout::LayoutSettings;
 use super::store::radiance::Radiance;
 use super::store::volume::Volume;
 use super::store::{Irradiance, Occlusion};
+
+/// The tensor that says which probe stands for which point of a mixed grid, see [`Tree`].
+const GRID_INDEX: &str = "grid_index";
 
 /// Value of the metadata key `format`.
 pub const FORMAT: &str = "lightprobe/1";
@@ -81,14 +86,18 @@ pub fn encode(volume: &Volume, provenance: &Provenance) -> (Container, EncodingL
     container.put_json(
         "grid",
         &GridRecord {
-            kind: GridKind::Uniform,
+            kind: if grid.tree().is_some() { GridKind::Mixed } else { GridKind::Uniform },
             origin: grid.origin_world().to_array(),
             spacing: grid.spacing().to_array(),
             divisions: grid.divisions().to_array(),
-            levels: 0,
+            levels: grid.tree().map_or(0, Tree::levels),
             border: provenance.border,
         },
     );
+    if let Some(tree) = grid.tree() {
+        let index = tree.index();
+        container.put(GRID_INDEX, Dtype::I32, &[index.len()], index.iter().map(|i| i.to_le_bytes()));
+    }
     container.metadata.insert("format".to_owned(), FORMAT.to_owned());
     container.metadata.insert("config".to_owned(), provenance.config.to_owned());
     container.put_json("query", provenance.query);
@@ -121,11 +130,15 @@ pub fn read(path: &Path) -> Result<ProbeFile, FileError> {
 fn decode(container: &Container, file_bytes: u64) -> Result<ProbeFile, String> {
     let record: GridRecord = container.json("grid")?;
     let spacing = Vec3::from(record.spacing);
-    let grid = Grid::from_parts(DVec3::from(record.origin), spacing, UVec3::from(record.divisions))
+    let mut grid = Grid::from_parts(DVec3::from(record.origin), spacing, UVec3::from(record.divisions))
         .ok_or_else(|| format!("metadata 'grid' makes no grid: {:?} probes at spacing {spacing}", record.divisions))?;
-    if record.border > 1 || record.levels > 0 {
+    if record.border > 1 || (record.kind == GridKind::Uniform) != (record.levels == 0) {
         let (border, levels) = (record.border, record.levels);
         return Err(format!("metadata 'grid' has the unknown border {border} or levels {levels}"));
+    }
+    if record.kind == GridKind::Mixed {
+        let index = container.tensor(GRID_INDEX, &[Dtype::I32], &[None])?;
+        grid = grid.with_index(record.levels, index.u32s().map(|i| i as i32).collect())?;
     }
     let probes = grid.probe_count();
     let positions = container.tensor("position", &[Dtype::F32], &[Some(probes), Some(3)])?.f32s();
@@ -183,6 +196,12 @@ impl ProbeFile {
     /// The volume relative to its own grid's origin.
     pub fn volume_in_grid(&self) -> &Volume {
         &self.volume_in_grid
+    }
+
+    /// Where the file was made from, with another configuration.
+    pub fn provenance<'a>(&'a self, config: &'a str) -> Provenance<'a> {
+        let ProbeFile { query, scene, plan, border, .. } = self;
+        Provenance { config, query, scene, seed: self.seed.unwrap_or(0), plan, border: *border }
     }
 
     /// The volume without what the plan found unnecessary, should the file hold it all the same.

@@ -12,12 +12,12 @@ use crate::scene::Unassigned;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GridRecord {
     pub kind: GridKind,
-    /// Probe (0,0,0), world space, metres.
+    /// Point (0,0,0), world space, metres: a probe, or in mixed grids the centre of the first of the finest cells.
     pub origin: [f64; 3],
     pub spacing: [f32; 3],
-    /// Probes along each axis.
+    /// Points along each axis.
     pub divisions: [u32; 3],
-    /// Levels of subdivision below the base cells; 0 for uniform grids.
+    /// Levels of subdivision below the base cells, 2^levels of the finest wide; 0 for uniform grids.
     pub levels: u32,
     /// Border texels of the maps.
     pub border: usize,
@@ -26,7 +26,10 @@ pub struct GridRecord {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum GridKind {
+    /// A probe at every point.
     Uniform,
+    /// The tensor `grid_index` says which probe stands for which point.
+    Mixed,
 }
 
 /// The metadata key `scene`.
@@ -37,7 +40,8 @@ pub struct SceneRecord {
 }
 
 /// Version of the metadata key `query` that this program writes. A change of what a look-up does raises it.
-/// 2 added `light.unassigned`; 3 added `weights.bias_spacing`, `weights.distance_bias` and `weights.blank_below`.
+/// 2 added `light.unassigned`; 3 added to `weights` `weight_normal`, `look_up`, `bias_spacing`, `distance_bias` and
+/// `blank_below`.
 pub const QUERY_VERSION: u32 = 3;
 
 /// The metadata key `query`: all that a look-up and the shading around it need beside the tensors.

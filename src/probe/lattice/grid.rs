@@ -1,86 +1,38 @@
-//! The uniform grid of probes.
+//! The grid of probes: uniform, or mixed.
 //!
-//! Probe (x, y, z) has the index `x + nx·(y + ny·z)` and lies at `origin + (x, y, z)·spacing` before relocation.
+//! Point (x, y, z) of a uniform grid is the probe `x + nx·(y + ny·z)` and lies at `origin + (x, y, z)·spacing` before
+//! relocation. In a mixed grid a [`Tree`] says which probe stands for each of these points: one of its own, or that of a
+//! larger cell around it. Look-ups ask the eight points around them either way.
+
+use std::sync::Arc;
 
 use glam::{DVec3, UVec3, Vec3};
-use serde::{Deserialize, Serialize};
 
+use super::crossings::Crossings;
+use super::refine::{MAX_LEVELS, Refine};
+use super::settings::Layout;
+pub use super::settings::{Bounds, GridError, GridSettings, MAX_PROBES};
+use super::tree::Tree;
 use crate::scene::{Mesh, Scene};
 
 /// Index of a probe in the file's tensors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ProbeIndex(pub u32);
 
-/// Cells along the longest side of the bounds where neither spacing nor divisions are given.
-const DEFAULT_CELLS: f64 = 16.0;
-
-/// More probes than this are taken for a slip of the spacing.
-pub const MAX_PROBES: u64 = 1 << 26;
-
-/// The volume of scenes without extent along all axes, metres per side.
-const POINT_SCENE_SIZE_M: f64 = 1.0;
-
-/// What the user may say about the grid.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields, rename_all = "snake_case")]
-pub struct GridSettings {
-    /// Box that the probes must cover, world space, metres; the scene's bounding box where not given.
-    pub bounds: Option<Bounds>,
-    /// Distance between neighbours, metres, the same along all axes.
-    pub spacing_m: Option<f64>,
-    /// Number of probes along x, y and z; excludes `spacing_m`.
-    pub divisions: Option<(u32, u32, u32)>,
-    /// Margin around the scene's own bounding box as a share of the spacing, so that hits on its walls stay inside.
-    pub padding: f64,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Bounds {
-    pub min: (f64, f64, f64),
-    pub max: (f64, f64, f64),
-}
-
-impl Default for GridSettings {
-    fn default() -> Self {
-        GridSettings { bounds: None, spacing_m: None, divisions: None, padding: 0.05 }
-    }
-}
-
-/// Why there is no such grid. Each message names the setting.
-#[derive(Debug, thiserror::Error, PartialEq)]
-pub enum GridError {
-    #[error("grid.spacing_m is {0}: it must be a positive number of metres")]
-    Spacing(f64),
-    #[error("grid.divisions is {0:?}: every axis needs at least one probe")]
-    Divisions((u32, u32, u32)),
-    #[error("grid.spacing_m and grid.divisions are both given: remove one")]
-    Both,
-    #[error("grid.padding is {0}: it must be a number from 0 to 1")]
-    Padding(f64),
-    #[error("grid.bounds: min {min} must be finite and not above max {max}")]
-    Bounds { min: DVec3, max: DVec3 },
-    #[error("the grid would have {} probes, more than 2^26: raise grid.spacing_m or lower grid.divisions", in_words(*.0))]
-    TooMany(f64),
-}
-
-/// A number of probes; rounded where no one counts.
-fn in_words(count: f64) -> String {
-    if count < 1e9 { count.to_string() } else { format!("about {count:.0e}") }
-}
-
-/// Where probes stand. What others ask — cells, corners, neighbours — they ask by methods: only this file knows that the
-/// lattice is uniform.
+/// Where probes stand. What others ask — cells, corners, neighbours — they ask by methods: only this file knows whether
+/// the lattice is uniform.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
-    /// Probe (0,0,0) in world space, metres: what positions in the file are relative to.
+    /// Point (0,0,0) in world space, metres: what positions in the file are relative to.
     origin_world: DVec3,
     /// The same relative to the scene's origin.
     origin: Vec3,
     /// Metres along each axis.
     spacing: Vec3,
-    /// Probes along each axis, at least one.
+    /// Points along each axis, at least one.
     divisions: UVec3,
+    /// Which probe stands for which point; `None`: each has its own.
+    tree: Option<Arc<Tree>>,
 }
 
 /// Index of a cell, x fastest.
@@ -97,56 +49,36 @@ pub struct Cell {
 }
 
 impl Grid {
+    /// A uniform grid.
+    ///
+    /// # Errors
+    /// The settings make none.
     pub fn new(settings: &GridSettings, scene: &Scene) -> Result<Grid, GridError> {
-        if settings.spacing_m.is_some() && settings.divisions.is_some() {
-            return Err(GridError::Both);
-        }
-        if !(0.0..=1.0).contains(&settings.padding) {
-            return Err(GridError::Padding(settings.padding));
-        }
-        // Relative to the scene's origin, so that a moved scene gives the same grid bit by bit.
-        let (low, high) = match settings.bounds {
-            Some(bounds) => {
-                let (min, max) = (DVec3::from(bounds.min), DVec3::from(bounds.max));
-                if !(min.is_finite() && max.is_finite() && min.cmple(max).all()) {
-                    return Err(GridError::Bounds { min, max });
-                }
-                (min - scene.origin_world, max - scene.origin_world)
-            }
-            None => scene_bounds(scene),
-        };
-        let padding = if settings.bounds.is_some() { 0.0 } else { settings.padding };
-        let (spacing, divisions) = match (settings.spacing_m, settings.divisions) {
-            (_, Some(divisions)) => {
-                if divisions.0 == 0 || divisions.1 == 0 || divisions.2 == 0 {
-                    return Err(GridError::Divisions(divisions));
-                }
-                let (low_scene, high_scene) = scene_bounds(scene);
-                let usual = (high_scene - low_scene).max_element() / DEFAULT_CELLS;
-                spread(high - low, UVec3::from(divisions), padding, usual)
-            }
-            (Some(spacing), None) => {
-                if !(spacing > 0.0 && spacing.is_finite()) {
-                    return Err(GridError::Spacing(spacing));
-                }
-                cover(high - low, spacing, padding)?
-            }
-            (None, None) => {
-                let spacing = (high - low).max_element() / DEFAULT_CELLS;
-                cover(high - low, spacing, padding)?
-            }
-        };
-        // Exact as far as it is compared, and beyond that not wrapped.
-        let count: f64 = divisions.to_array().iter().map(|&n| f64::from(n)).product();
-        if count > MAX_PROBES as f64 {
-            return Err(GridError::TooMany(count));
-        }
-        let origin = (low + high) / 2.0 - spacing * (divisions - UVec3::ONE).as_dvec3() / 2.0;
-        Ok(Grid {
+        Grid::refined(settings, Refine::Uniform, scene)
+    }
+
+    /// A grid that is refined where `refine` says so: its points are those of the uniform grid of the same settings, with so
+    /// many more along each axis that they fill whole base cells.
+    ///
+    /// # Errors
+    /// The settings make none.
+    pub fn refined(settings: &GridSettings, refine: Refine, scene: &Scene) -> Result<Grid, GridError> {
+        let Layout { origin, spacing, divisions } = settings.layout(scene, refine.base_cell())?;
+        let uniform = Grid {
             origin_world: scene.origin_world + origin,
             origin: origin.as_vec3(),
             spacing: spacing.as_vec3(),
             divisions,
+            tree: None,
+        };
+        Ok(match refine {
+            Refine::Uniform => uniform,
+            Refine::Mixed { levels } => {
+                let levels = levels.min(MAX_LEVELS);
+                let crossed = Crossings::of(&scene.mesh, uniform.origin, uniform.spacing, divisions, levels);
+                let tree = Tree::new(divisions >> levels, levels, |level, cell| crossed.divides(level, cell));
+                Grid { tree: Some(Arc::new(tree)), ..uniform }
+            }
         })
     }
 
@@ -154,7 +86,32 @@ impl Grid {
     pub fn from_parts(origin_world: DVec3, spacing: Vec3, divisions: UVec3) -> Option<Grid> {
         let count = divisions.to_array().iter().map(|&n| u64::from(n)).try_fold(1, u64::checked_mul)?;
         let usable = (1..=MAX_PROBES).contains(&count) && spacing.is_finite() && spacing.min_element() > 0.0;
-        (usable && origin_world.is_finite()).then_some(Grid { origin_world, origin: Vec3::ZERO, spacing, divisions })
+        (usable && origin_world.is_finite()).then_some(Grid {
+            origin_world,
+            origin: Vec3::ZERO,
+            spacing,
+            divisions,
+            tree: None,
+        })
+    }
+
+    /// The same points with a file's index of a mixed grid of so many levels.
+    ///
+    /// # Errors
+    /// The index is none of these points.
+    pub fn with_index(&self, levels: u32, index: Vec<i32>) -> Result<Grid, String> {
+        let tree = Tree::from_index(self.divisions, levels, index)?;
+        Ok(Grid { tree: Some(Arc::new(tree)), ..self.clone() })
+    }
+
+    /// The uniform grid of the same points.
+    pub fn uniform(&self) -> Grid {
+        Grid { tree: None, ..self.clone() }
+    }
+
+    /// Which probe stands for which point, where not each has its own.
+    pub fn tree(&self) -> Option<&Tree> {
+        self.tree.as_deref()
     }
 
     /// The same grid relative to another origin, and how far everything moves by it.
@@ -189,39 +146,96 @@ impl Grid {
         self.spacing.min_element()
     }
 
-    /// Probes along each axis.
+    /// Bytes per probe that a look-up reads to find probes, besides their places where these are stored anyway: in mixed grids
+    /// the index, and every probe's level and place.
+    pub fn runtime_bytes(&self, stores_places: bool) -> f64 {
+        const ENTRY_BYTES: usize = 4;
+        const LEVEL_BYTES: usize = 4;
+        const PLACE_BYTES: usize = 12;
+        let Some(tree) = &self.tree else { return 0.0 };
+        let places = if stores_places { 0 } else { PLACE_BYTES };
+        (ENTRY_BYTES * tree.index().len()) as f64 / tree.probe_count() as f64 + (LEVEL_BYTES + places) as f64
+    }
+
+    /// Kind and size in words.
+    pub fn describe(&self) -> String {
+        let [x, y, z] = self.divisions.to_array();
+        match &self.tree {
+            None => format!("uniform, {x} × {y} × {z} probes"),
+            Some(tree) => format!(
+                "mixed, {} probes for {x} × {y} × {z} cells, {} levels below {} base cells",
+                tree.probe_count(),
+                tree.levels(),
+                tree.base_count()
+            ),
+        }
+    }
+
+    /// Points along each axis; those of the finest cells in a mixed grid.
     pub fn divisions(&self) -> UVec3 {
         self.divisions
     }
 
     pub fn probe_count(&self) -> usize {
-        self.divisions.to_array().iter().map(|&n| n as usize).product()
+        match &self.tree {
+            None => self.divisions.to_array().iter().map(|&n| n as usize).product(),
+            Some(tree) => tree.probe_count(),
+        }
     }
 
     pub fn probes(&self) -> impl DoubleEndedIterator<Item = ProbeIndex> + Clone + use<> {
         (0..self.probe_count() as u32).map(ProbeIndex)
     }
 
-    /// Place of a probe before relocation, relative to the scene's origin, metres.
+    /// Place of a probe before relocation, relative to the scene's origin, metres: the middle of its points.
     pub fn grid_point(&self, probe: ProbeIndex) -> Vec3 {
-        self.origin + self.coordinate(probe).as_vec3() * self.spacing
+        self.origin + self.steps(probe) * self.spacing
     }
 
-    /// Number of a probe along each axis.
+    /// Place of a probe before relocation from point (0,0,0), in spacings: whole ones, or halves.
+    pub fn steps(&self, probe: ProbeIndex) -> Vec3 {
+        self.coordinate(probe).as_vec3() + 0.5 * (self.width(probe) - 1) as f32
+    }
+
+    /// Number along each axis of the lowest point that a probe stands for.
     pub fn coordinate(&self, probe: ProbeIndex) -> UVec3 {
+        if let Some(tree) = &self.tree {
+            return tree.low(probe.0);
+        }
         let (nx, ny) = (self.divisions.x, self.divisions.y);
         UVec3::new(probe.0 % nx, probe.0 / nx % ny, probe.0 / (nx * ny))
     }
 
+    /// Points along each axis that a probe stands for: 1, or a power of two in a mixed grid.
+    #[inline]
+    pub fn width(&self, probe: ProbeIndex) -> u32 {
+        self.tree.as_ref().map_or(1, |tree| tree.width(probe.0))
+    }
+
+    /// What numbers a probe's random sequences: the same for probes of the same cell in uniform and mixed grids.
+    pub fn stream(&self, probe: ProbeIndex) -> u64 {
+        let low = self.coordinate(probe);
+        u64::from(self.point_index(low)) | u64::from(self.width(probe) - 1) << 32
+    }
+
+    #[inline]
+    fn point_index(&self, coordinate: UVec3) -> u32 {
+        coordinate.x + self.divisions.x * (coordinate.y + self.divisions.y * coordinate.z)
+    }
+
+    /// The probe that stands for a point.
     #[inline]
     fn index(&self, coordinate: UVec3) -> ProbeIndex {
-        ProbeIndex(coordinate.x + self.divisions.x * (coordinate.y + self.divisions.y * coordinate.z))
+        match &self.tree {
+            None => ProbeIndex(self.point_index(coordinate)),
+            Some(tree) => ProbeIndex(tree.probe(coordinate)),
+        }
     }
 
     /// Whether a probe lies at the rim of the grid.
     pub fn is_at_rim(&self, probe: ProbeIndex) -> bool {
         let coordinate = self.coordinate(probe);
-        coordinate.cmpeq(UVec3::ZERO).any() || coordinate.cmpeq(self.divisions - UVec3::ONE).any()
+        coordinate.cmpeq(UVec3::ZERO).any() || (coordinate + self.width(probe)).cmpeq(self.divisions).any()
     }
 
     /// Corners of the probes' hull relative to the scene's origin, enlarged by `tolerance` spacings.
@@ -306,8 +320,12 @@ impl Grid {
     pub fn corners_around(&self, cell: &Cell) -> [ProbeIndex; 8] {
         // From a corner to the next along each axis; none where there is a single layer.
         let layered = self.divisions.min(UVec3::splat(2)) - UVec3::ONE;
+        if let Some(tree) = &self.tree {
+            let corner = |i: u32| tree.probe(cell.base + layered * UVec3::new(i & 1, i >> 1 & 1, i >> 2));
+            return std::array::from_fn(|i| ProbeIndex(corner(i as u32)));
+        }
         let UVec3 { x, y, z } = layered * UVec3::new(1, self.divisions.x, self.divisions.x * self.divisions.y);
-        let (lowest, steps) = (self.index(cell.base).0, [[0, x], [0, y], [0, z]]);
+        let (lowest, steps) = (self.point_index(cell.base), [[0, x], [0, y], [0, z]]);
         std::array::from_fn(|i| ProbeIndex(lowest + steps[0][i & 1] + steps[1][i >> 1 & 1] + steps[2][i >> 2]))
     }
 
@@ -346,12 +364,12 @@ impl Grid {
     /// Cells that a probe is a corner of.
     pub fn cells_of(&self, probe: ProbeIndex) -> impl Iterator<Item = CellIndex> + '_ {
         let last = self.cells_along() - UVec3::ONE;
-        let high = self.coordinate(probe).min(last);
+        let high = (self.coordinate(probe) + (self.width(probe) - 1)).min(last);
         let low = self.coordinate(probe).saturating_sub(UVec3::ONE).min(last);
         block(low, high).map(|base| self.index_of_cell(base))
     }
 
-    /// The `ring`-th layer of probes around the eight corners of a cell; the corners are layer 0.
+    /// The `ring`-th layer of points around the eight corners of a cell, by their probes; the corners are layer 0.
     pub fn ring(&self, cell: CellIndex, ring: u32) -> impl Iterator<Item = ProbeIndex> + '_ {
         let base = self.base(cell);
         let past = base + UVec3::splat(1 + ring);
@@ -365,35 +383,4 @@ impl Grid {
 fn block(low: UVec3, high: UVec3) -> impl Iterator<Item = UVec3> {
     (low.z..=high.z)
         .flat_map(move |z| (low.y..=high.y).flat_map(move |y| (low.x..=high.x).map(move |x| UVec3::new(x, y, z))))
-}
-
-/// The scene's box; scenes that are flat or empty get some depth.
-fn scene_bounds(scene: &Scene) -> (DVec3, DVec3) {
-    let (low, high) = scene.mesh.bounds().unwrap_or((Vec3::ZERO, Vec3::ZERO));
-    let (low, high) = (low.as_dvec3(), high.as_dvec3());
-    if high == low {
-        let half = DVec3::splat(POINT_SCENE_SIZE_M / 2.0);
-        return (low - half, high + half);
-    }
-    (low, high)
-}
-
-/// Enough probes at this spacing that their hull covers the extent and the padding, as many on either side.
-fn cover(extent: DVec3, spacing: f64, padding: f64) -> Result<(DVec3, UVec3), GridError> {
-    let cells = (extent / spacing + 2.0 * padding).ceil().max(DVec3::ONE);
-    // Before a long side is cut down to u32.
-    if cells.max_element() > MAX_PROBES as f64 {
-        return Err(GridError::TooMany((cells + 1.0).element_product()));
-    }
-    Ok((DVec3::splat(spacing), cells.as_uvec3() + UVec3::ONE))
-}
-
-/// The spacing at which this many probes cover the extent and the padding; `usual` where there is no extent.
-fn spread(extent: DVec3, divisions: UVec3, padding: f64, usual: f64) -> (DVec3, UVec3) {
-    let cells = (divisions - UVec3::ONE).as_dvec3();
-    let room = (cells - 2.0 * padding).max(DVec3::splat(0.5));
-    // A single layer needs a spacing too, for what is measured in spacings; so do axes along which the scene is flat.
-    let layered = DVec3::select(divisions.cmpgt(UVec3::ONE), extent / room, extent);
-    let fallback = if layered.max_element() > 0.0 { layered.max_element() } else { usual };
-    (DVec3::select(layered.cmpgt(DVec3::splat(fallback * 1e-6)), layered, DVec3::splat(fallback)), divisions)
 }

@@ -1,5 +1,7 @@
 //! The grid against what counting says.
 
+mod mixed;
+
 use glam::{DVec3, UVec3, Vec3};
 use proptest::prelude::*;
 

@@ -17,10 +17,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::light::World;
 use crate::math::fibonacci;
-use crate::probe::lattice::{Grid, ProbeState};
+use crate::probe::lattice::ProbeState;
 use crate::trace::Ray;
 
-/// Lengths are in the smallest of the grid's three spacings. The sources' `min_front` and `max_step` are one unit of the
+/// Lengths are in the smallest of the grid's three spacings; of mixed grids in as many of them as the probe's cell is wide. The sources' `min_front` and `max_step` are one unit of the
 /// scene's; these are ours.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -97,19 +97,19 @@ pub struct Relocated {
     pub rays: u64,
 }
 
-/// Moves and classifies the probe of a grid point.
-pub fn place(world: &World, grid: &Grid, settings: &DdgiSettings, grid_point: Vec3) -> Relocated {
+/// Moves and classifies the probe of a grid point; `cell`: the sides of the cell that it stands for, metres.
+pub fn place(world: &World, cell: Vec3, settings: &DdgiSettings, grid_point: Vec3) -> Relocated {
     let mut offset = Vec3::ZERO;
-    let mut around = look(world, grid, settings, grid_point);
+    let mut around = look(world, cell, settings, grid_point);
     let mut rays = settings.rays as u64;
     let steps = if settings.relocate { settings.max_steps } else { 0 };
     for _ in 0..steps {
-        let next = step(grid, settings, offset, &around);
+        let next = step(cell, settings, offset, &around);
         if next == offset {
             break;
         }
         offset = next;
-        around = look(world, grid, settings, grid_point + offset);
+        around = look(world, cell, settings, grid_point + offset);
         rays += settings.rays as u64;
     }
     let inside = is_inside(settings, &around);
@@ -122,14 +122,14 @@ pub fn place(world: &World, grid: &Grid, settings: &DdgiSettings, grid_point: Ve
     }
 }
 
-fn look(world: &World, grid: &Grid, settings: &DdgiSettings, position: Vec3) -> Around {
+fn look(world: &World, cell: Vec3, settings: &DdgiSettings, position: Vec3) -> Around {
     let mut around = Around::default();
     for i in 0..settings.rays {
         let direction = fibonacci::direction(i, settings.rays);
         // The same chance at every place: rays are fixed.
         let surface = world.surface(Ray::new(position, direction, i as u32));
         let (t, is_back) = surface.map_or((f32::INFINITY, false), |s| (s.hit.t, s.is_back()));
-        around.add(t, direction, is_back, grid.spacing());
+        around.add(t, direction, is_back, cell);
     }
     around
 }
@@ -161,8 +161,8 @@ fn is_inside(settings: &DdgiSettings, around: &Around) -> bool {
 }
 
 /// The offset after one step; the same where the probe stays.
-fn step(grid: &Grid, settings: &DdgiSettings, offset: Vec3, around: &Around) -> Vec3 {
-    let metres = grid.spacing_min();
+fn step(cell: Vec3, settings: &DdgiSettings, offset: Vec3, around: &Around) -> Vec3 {
+    let metres = cell.min_element();
     let min_front = settings.min_front * metres;
     let inside = is_inside(settings, around);
     let next = match (around.nearest_back, around.nearest_front, around.farthest_front) {
@@ -176,30 +176,26 @@ fn step(grid: &Grid, settings: &DdgiSettings, offset: Vec3, around: &Around) -> 
         (_, Some((near, _)), _) => offset - offset.normalize_or_zero() * (near - min_front).min(offset.length()),
         _ => return offset,
     };
-    let allowed = (next / grid.spacing()).length() < settings.max_offset;
+    let allowed = (next / cell).length() < settings.max_offset;
     if allowed { next } else { offset }
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::{DVec3, UVec3};
-
     use super::*;
 
-    fn grid() -> Grid {
-        Grid::from_parts(DVec3::ZERO, Vec3::new(1.0, 2.0, 1.0), UVec3::splat(2)).unwrap()
-    }
+    const CELL: Vec3 = Vec3::new(1.0, 2.0, 1.0);
 
     /// What four rays met: (distance, direction, back).
     fn around(rays: &[(f32, Vec3, bool)]) -> (DdgiSettings, Around) {
         let mut found = Around::default();
-        rays.iter().for_each(|&(t, d, back)| found.add(t, d, back, grid().spacing()));
+        rays.iter().for_each(|&(t, d, back)| found.add(t, d, back, CELL));
         (DdgiSettings { rays: rays.len(), ..Default::default() }, found)
     }
 
     fn stepped(offset: Vec3, rays: &[(f32, Vec3, bool)]) -> Vec3 {
         let (settings, around) = around(rays);
-        step(&grid(), &settings, offset, &around)
+        step(CELL, &settings, offset, &around)
     }
 
     #[test]

@@ -7,10 +7,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::ddgi::DdgiSettings;
+use crate::probe::lattice::Refine;
 
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlacementSettings {
+    /// Where the grid is finer than elsewhere.
+    pub refine: Refine,
     pub rule: PlacementRule,
     /// Bake probes that no surface can sample, for objects that move through the air.
     pub keep_unsampled: bool,

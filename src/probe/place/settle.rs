@@ -10,7 +10,7 @@ use super::settings::{PlacementRule, SettleSettings};
 use crate::light::World;
 use crate::light::contact::Contacts;
 use crate::math::fibonacci;
-use crate::probe::lattice::{Grid, ProbeState};
+use crate::probe::lattice::{Grid, ProbeIndex, ProbeState};
 use crate::trace::Ray;
 
 /// What the rays around a position meet.
@@ -58,7 +58,8 @@ pub fn settle_all(world: &World, task: &PlacementTask) -> Placement {
             PlacementRule::Settle(rule) => Settler { world, grid, settings: rule }.settle(position, viewpoint),
             PlacementRule::GridPoints => Settled { state: ProbeState::Active, position, rays: 0, moved: false },
             PlacementRule::Ddgi(rule) => {
-                let Relocated { state, position, moved, rays } = ddgi::place(world, grid, rule, position);
+                let cell = grid.spacing() * grid.width(ProbeIndex(probe as u32)) as f32;
+                let Relocated { state, position, moved, rays } = ddgi::place(world, cell, rule, position);
                 Settled { state, position, rays, moved }
             }
         }

@@ -8,6 +8,7 @@ use crate::probe::lattice::grid::{Cell, Grid, ProbeIndex};
 use crate::probe::store::map::OctahedralMaps;
 use crate::probe::store::moments::chebyshev_shortened;
 use crate::probe::store::surface::{Seen, SurfaceVisibility, TableTest};
+use crate::probe::store::tiles::{Tiles, box_sides};
 
 pub trait CornerTest {
     /// Which corners of its cell a point may see at all.
@@ -71,5 +72,31 @@ impl CornerTest for SurfaceTest<'_> {
     #[inline]
     fn factor(&self, _: ProbeIndex, _: Vec3) -> f32 {
         1.0
+    }
+}
+
+/// Distances as shares of the way to a box around the probe.
+pub struct TilesTest<'v> {
+    pub tiles: &'v Tiles,
+    pub grid: &'v Grid,
+    pub positions: &'v [Vec3],
+    pub power: f32,
+    pub floor: f32,
+    /// By how much distances count as shorter, metres.
+    pub shorter: f32,
+}
+
+impl CornerTest for TilesTest<'_> {
+    #[inline]
+    fn seen(&self, _: &Grid, _: &Cell, _: &QueryPoint, _: Vec3) -> Seen {
+        Seen { mask: u8::MAX, far: None }
+    }
+
+    #[inline]
+    fn factor(&self, probe: ProbeIndex, biased: Vec3) -> f32 {
+        let p = probe.0 as usize;
+        let (sides, steepness) = (box_sides(self.grid, probe), self.grid.width(probe) as f32);
+        let visibility = self.tiles.visibility(p, biased - self.positions[p], sides, steepness, self.shorter);
+        visibility.powf(self.power).max(self.floor)
     }
 }

@@ -1,13 +1,13 @@
 //! The look-up itself.
 
-use glam::{Vec2, Vec3, Vec3A};
+use glam::{Vec2, Vec3};
 
-use super::corner_test::{CornerTest, Mask, MomentsTest, SurfaceTest};
+use super::corner_test::{CornerTest, Mask, MomentsTest, SurfaceTest, TilesTest};
 use super::point::{CornerWeights, QueryPoint, Visibility};
-use super::settings::{QuerySettings, VisibilityTest};
+use super::settings::{LookUp, QuerySettings, VisibilityTest, WeightNormal};
 use crate::math::octahedral::oct_from_direction;
 use crate::probe::Volume;
-use crate::probe::lattice::grid::Cell;
+use crate::probe::lattice::grid::{Cell, ProbeIndex};
 
 /// A volume and the way to ask it.
 #[derive(Clone, Copy)]
@@ -20,6 +20,7 @@ pub struct Query<'v> {
 enum Test<'v> {
     Mask(Mask),
     Moments(MomentsTest<'v>),
+    Tiles(TilesTest<'v>),
     Surface(SurfaceTest<'v>),
 }
 
@@ -35,9 +36,9 @@ impl<'v> Query<'v> {
                 VisibilityTest::None => None,
                 VisibilityTest::Chebyshev { power, floor } => {
                     let shorter = self.settings.distance_bias * self.settings.spacing(grid);
-                    occlusion
-                        .moments()
-                        .map(|maps| Test::Moments(MomentsTest { maps, positions, power, floor, shorter }))
+                    let tiles = |tiles| Test::Tiles(TilesTest { tiles, grid, positions, power, floor, shorter });
+                    let moments = |maps| Test::Moments(MomentsTest { maps, positions, power, floor, shorter });
+                    occlusion.moments().map(moments).or_else(|| occlusion.tiles().map(tiles))
                 }
                 VisibilityTest::Table(test) => {
                     occlusion.surface().map(|table| Test::Surface(SurfaceTest { table, test }))
@@ -54,8 +55,17 @@ impl<'v> Query<'v> {
         if self.settings.reach() == 0.0 {
             return point.position;
         }
-        let bias = point.normal * self.settings.normal_bias + point.view * self.settings.view_bias;
+        let bias = self.weight_normal(point) * self.settings.normal_bias + point.view * self.settings.view_bias;
         point.position + bias * self.settings.spacing(&self.volume.grid)
+    }
+
+    /// The normal that weights and bias take.
+    #[inline]
+    fn weight_normal(&self, point: &QueryPoint) -> Vec3 {
+        match self.settings.weight_normal {
+            WeightNormal::Shading => point.normal,
+            WeightNormal::Geometric => point.geometric,
+        }
     }
 
     #[inline]
@@ -73,6 +83,7 @@ impl<'v> Query<'v> {
         match self.test(visibility) {
             Test::Mask(test) => self.weigh(point, &test),
             Test::Moments(test) => self.weigh(point, &test),
+            Test::Tiles(test) => self.weigh(point, &test),
             Test::Surface(test) => self.weigh(point, &test),
         }
     }
@@ -104,7 +115,7 @@ impl<'v> Query<'v> {
                 continue;
             }
             let to_probe = || (volume.position(probe) - point.position).normalize_or_zero();
-            let mut weight = settings.direction.at(|| to_probe().dot(point.normal));
+            let mut weight = settings.direction.at(|| to_probe().dot(self.weight_normal(point)));
             weight *= test.factor(probe, biased);
             weight = weight.max(settings.weight_floor);
             if weight < settings.crush_below {
@@ -120,30 +131,45 @@ impl<'v> Query<'v> {
 
     /// Irradiance around the point's normal, W·m⁻²; zero where no probe counts.
     pub fn irradiance(&self, point: &QueryPoint, visibility: Visibility) -> Vec3 {
-        self.blend(&self.weights(point, visibility), oct_from_direction(point.normal))
+        let irradiance = self.blend(&self.weights(point, visibility), point, oct_from_direction(point.normal));
+        // Sums of harmonics dip below 0 beside bright lights. Bounces keep that, to stay linear; no one is shown it.
+        if self.volume.irradiance.signed().is_some() { irradiance.max(Vec3::ZERO) } else { irradiance }
     }
 
-    /// Weighted mean of the probes' irradiance around the direction `oct`.
+    /// Weighted mean of the probes' irradiance around the direction `oct`, the point's normal.
     #[inline]
-    pub fn blend(&self, corners: &CornerWeights, oct: Vec2) -> Vec3 {
+    pub fn blend(&self, corners: &CornerWeights, point: &QueryPoint, oct: Vec2) -> Vec3 {
         let total = corners.total();
         if total <= 0.0 {
             return Vec3::ZERO;
         }
-        let irradiance = &self.volume.irradiance;
-        // One direction serves all eight probes.
-        let around = irradiance.around(oct);
         // Crushed weights may be so small that the reciprocal of their sum overflows; their shares are the same.
         let lift = if total < f32::MIN_POSITIVE { 1.0 / f32::MIN_POSITIVE } else { 1.0 };
         let per_total = 1.0 / (total * lift);
-        let mut sum = Vec3A::ZERO;
-        for (probe, weight) in corners.probes.iter().zip(corners.weights) {
-            if weight > 0.0 {
-                let irradiance = irradiance.at(probe.0 as usize, &around);
-                sum += self.settings.blend.forward(irradiance) * (weight * lift * per_total);
+        let counted = corners.probes.iter().zip(corners.weights).filter(|(_, weight)| *weight > 0.0);
+        let shares = counted.map(|(probe, weight)| (probe.0 as usize, weight * lift * per_total));
+        let forward = |e| self.settings.blend.forward(e);
+        let sum = match self.settings.look_up {
+            LookUp::Normal => self.volume.irradiance.sum(oct, shares, forward),
+            LookUp::Towards => {
+                let biased = self.biased(point);
+                let of = |(probe, share)| {
+                    let oct = self.towards(probe, biased, point.normal);
+                    self.volume.irradiance.sum(oct, [(probe, share)].into_iter(), forward)
+                };
+                shares.map(of).sum()
             }
-        }
+        };
         self.settings.blend.backward(sum).into()
+    }
+
+    /// Where a probe's irradiance is read for a point that asks for it around `normal`, see [`LookUp::Towards`].
+    fn towards(&self, probe: usize, biased: Vec3, normal: Vec3) -> Vec2 {
+        let Volume { occlusion, positions, grid, .. } = self.volume;
+        let distance = occlusion.mean_distance(grid, ProbeIndex(probe as u32), normal);
+        let target = biased + distance * normal - positions[probe];
+        // A probe that stands in the target knows no better direction.
+        oct_from_direction(target.try_normalize().unwrap_or(normal))
     }
 }
 

@@ -5,7 +5,7 @@
 //! 1. the cell and the trilinear weights, from P′ (from P where `biased_cell` is off);
 //! 2. for each of its eight probes the direction weight, from P, times the visibility test, from P′;
 //! 3. the floor, the crush and the trilinear weight; nothing where all eight are below `blank_below`;
-//! 4. the weighted mean of the probes' irradiance around the normal.
+//! 4. the weighted mean of the probes' irradiance around the normal, or towards where the light comes from.
 
 mod corner_test;
 mod look_up;
@@ -16,4 +16,4 @@ mod tests;
 
 pub use self::look_up::{Query, trilinear};
 pub use self::point::{CornerWeights, QueryPoint, Visibility};
-pub use self::settings::{BiasSpacing, Blend, DirectionWeight, QuerySettings, VisibilityTest};
+pub use self::settings::{BiasSpacing, Blend, DirectionWeight, LookUp, QuerySettings, VisibilityTest, WeightNormal};

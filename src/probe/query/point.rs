@@ -12,7 +12,9 @@ pub struct QueryPoint {
     pub position: Vec3,
     /// Shading normal, unit: irradiance is asked for around it.
     pub normal: Vec3,
-    /// Of the geometric normal on the viewer's side.
+    /// Geometric normal on the viewer's side, unit.
+    pub geometric: Vec3,
+    /// Its main direction.
     pub facing: Facing,
     /// Unit, towards the viewer; in the bake towards the probe.
     pub view: Vec3,

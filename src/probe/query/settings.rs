@@ -12,6 +12,8 @@ use crate::probe::store::surface::TableTest;
 #[serde(default, deny_unknown_fields)]
 pub struct QuerySettings {
     pub direction: DirectionWeight,
+    /// The normal that direction weights and the bias take.
+    pub weight_normal: WeightNormal,
     pub test: VisibilityTest,
     /// Smallest trilinear weight along each axis.
     pub trilinear_floor: f32,
@@ -33,6 +35,8 @@ pub struct QuerySettings {
     pub distance_bias: f32,
     /// Where every weight is below this, there is no light.
     pub blank_below: f32,
+    /// The direction that probes' irradiance is looked up around.
+    pub look_up: LookUp,
 }
 
 /// The spacing that lengths are relative to where the grid's differ along its axes.
@@ -47,6 +51,7 @@ impl Default for QuerySettings {
     fn default() -> Self {
         QuerySettings {
             direction: DirectionWeight::Uniform,
+            weight_normal: WeightNormal::Shading,
             test: VisibilityTest::default(),
             trilinear_floor: 0.0,
             weight_floor: 0.0,
@@ -58,6 +63,7 @@ impl Default for QuerySettings {
             bias_spacing: BiasSpacing::Largest,
             distance_bias: 0.0,
             blank_below: 0.0,
+            look_up: LookUp::Normal,
         }
     }
 }
@@ -72,6 +78,28 @@ pub enum DirectionWeight {
     Cosine { floor: f32 },
     /// ((c + 1)/2)² + offset.
     Wrap { offset: f32 },
+    /// (κc + √(1 − (1 − c²)κ²))/(κ + 1): 1 at c = 1, (1 − κ)/(1 + κ) at c = −1 (Fei Yang 2023).
+    Eccentric { kappa: f32 },
+}
+
+/// Which of a point's normals.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WeightNormal {
+    Shading,
+    /// Of the surface itself.
+    Geometric,
+}
+
+/// Where a look-up reads a probe's irradiance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LookUp {
+    /// Around the shading normal n.
+    Normal,
+    /// Around the direction from the probe to P′ + μ(n)·n, μ(n) the mean distance that the probe knows along n: to where the
+    /// light comes from that falls along n (a version of the shader of Fei Yang 2023).
+    Towards,
 }
 
 /// How a look-up decides which probes a point sees.
@@ -116,9 +144,18 @@ impl QuerySettings {
         }
     }
 
-    /// Whether weights depend on the point's shading normal.
-    pub fn needs_normal(&self) -> bool {
+    fn weights_need_normal(&self) -> bool {
         self.direction != DirectionWeight::Uniform || self.normal_bias != 0.0
+    }
+
+    /// Whether a look-up needs the point's shading normal besides the direction that it asks for.
+    pub fn needs_normal(&self) -> bool {
+        self.look_up == LookUp::Towards || self.weight_normal == WeightNormal::Shading && self.weights_need_normal()
+    }
+
+    /// Whether it needs the point's geometric normal.
+    pub fn needs_geometric(&self) -> bool {
+        self.weight_normal == WeightNormal::Geometric && self.weights_need_normal()
     }
 
     /// Whether weights depend on the direction to the viewer.
@@ -134,8 +171,12 @@ impl QuerySettings {
     /// Why this test cannot be asked of that store, with the remedy; `None` where it can.
     pub fn mismatch(&self, store: &OcclusionStore) -> Option<String> {
         let (test, written) = store.test();
-        let remedy = || format!("store.occlusion is {}: query.test must be {written}", store.name());
-        (self.test.name() != test).then(remedy)
+        let name = store.name();
+        if self.test.name() != test {
+            return Some(format!("store.occlusion is {name}: query.test must be {written}"));
+        }
+        let blind = self.look_up == LookUp::Towards && !store.knows_distances();
+        blind.then(|| format!("store.occlusion is {name} and knows no distances: query.look_up must be normal"))
     }
 
     /// Calls `rule(key, value, holds, rule)` for every number in it.
@@ -153,6 +194,7 @@ impl QuerySettings {
             DirectionWeight::Uniform => {}
             DirectionWeight::Cosine { floor } => unit("query.direction.cosine.floor", floor),
             DirectionWeight::Wrap { offset } => unit("query.direction.wrap.offset", offset),
+            DirectionWeight::Eccentric { kappa } => unit("query.direction.eccentric.kappa", kappa),
         }
         match self.test {
             VisibilityTest::None => {}
@@ -187,6 +229,12 @@ impl DirectionWeight {
             DirectionWeight::Uniform => 1.0,
             DirectionWeight::Cosine { floor } => cosine().max(floor),
             DirectionWeight::Wrap { offset } => (0.5 * (cosine() + 1.0)).powi(2) + offset,
+            DirectionWeight::Eccentric { kappa } => {
+                let c = cosine();
+                // Rounding may take the cosine beyond 1.
+                let across = 1.0 - (1.0 - c * c).max(0.0) * kappa * kappa;
+                (kappa * c + across.sqrt()) / (kappa + 1.0)
+            }
         }
     }
 }

@@ -152,7 +152,7 @@ const LARGEST_STORED: f32 = 32_768.0;
 const UNSCALED: std::ops::RangeInclusive<f32> = 0.015_625..=LARGEST_STORED;
 
 /// Power of two that brings a tensor with this largest value into the range of 16-bit and packed floats.
-fn scale_for(largest: f32, format: ColorFormat) -> f32 {
+pub(super) fn scale_for(largest: f32, format: ColorFormat) -> f32 {
     if format == ColorFormat::F32 || largest == 0.0 || UNSCALED.contains(&largest) {
         return 1.0;
     }

@@ -4,6 +4,8 @@
 //! computed once and shared by all probes. Rows are normalised to 1: constant radiance L gives an irradiance of
 //! exactly πL, whatever the resolutions.
 
+mod harmonics;
+
 use std::f32::consts::PI;
 
 use glam::{Quat, Vec2, Vec3, Vec3A};
@@ -45,7 +47,12 @@ impl Directions {
     /// Of rays that each stand for as much of the sphere as any other, unit.
     pub fn even(rays: Vec<Vec3>) -> Directions {
         let share = 4.0 * PI / rays.len().max(1) as f32;
-        Directions { all: rays.into_iter().map(|direction| (direction, share)).collect(), per_texel: 1 }
+        Directions::lone(rays.into_iter().map(|direction| (direction, share)).collect())
+    }
+
+    /// Of rays that are a texel each, unit, with the solid angles that they stand for, sr.
+    pub fn lone(rays: Vec<(Vec3, f32)>) -> Directions {
+        Directions { all: rays, per_texel: 1 }
     }
 
     /// The same turned.

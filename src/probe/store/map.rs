@@ -49,6 +49,12 @@ impl<T: Copy> OctahedralMaps<T> {
         &mut self.texels[probe * n..(probe + 1) * n]
     }
 
+    /// The maps of some probes, in this order.
+    pub fn of_probes(&self, probes: &[usize]) -> Self {
+        let texels = probes.iter().flat_map(|&probe| self.probe(probe).iter().copied()).collect();
+        OctahedralMaps { texels, ..*self }
+    }
+
     /// Where to look for `oct` ∈ [−1,1]²: half a texel in from the corner, shifted by the border.
     #[inline]
     pub fn taps(&self, oct: Vec2) -> Taps {

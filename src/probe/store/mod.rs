@@ -12,9 +12,11 @@ pub mod map;
 pub mod moments;
 pub mod occlusion;
 pub mod radiance;
+pub mod sh;
 pub mod surface;
 #[cfg(test)]
 mod tests;
+pub mod tiles;
 pub mod volume;
 
 use serde::{Deserialize, Serialize};

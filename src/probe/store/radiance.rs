@@ -105,8 +105,8 @@ impl RadianceStore<'_> {
         }
         let Some(side) = side else {
             return Some(
-                "store.light_field and store.prefiltered are maps of what is captured: capture.rays must be octahedral \
-                 or cube"
+                "store.light_field and store.prefiltered are maps of what is captured: capture.rays must be octahedral, \
+                 or cube with a resolution"
                     .to_owned(),
             );
         };

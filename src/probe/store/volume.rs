@@ -47,6 +47,7 @@ impl Volume {
     pub fn runtime_bytes(&self, moved: bool) -> f64 {
         let head = self.layout.head_bytes(moved) + self.irradiance.runtime_bytes();
         let (field, levels) = self.radiance.runtime_bytes(self.layout.g_buffer);
-        (head + field + levels) as f64 + self.occlusion.runtime_bytes(self.states.len(), &self.layout)
+        let own = (head + field + levels) as f64 + self.grid.runtime_bytes(moved);
+        own + self.occlusion.runtime_bytes(self.states.len(), &self.layout)
     }
 }

@@ -67,12 +67,20 @@ pub struct History {
     origin: Option<Field>,
     /// The operator applied to 1 everywhere, where that was done.
     ones: Option<Field>,
+    /// Every so manieth unknown, from the first on, is irradiance; the others are 0 where all light is even.
+    group: usize,
+}
+
+/// Irradiance 1 everywhere, as unknowns of which every `group`-th is irradiance.
+pub fn unit(texels: usize, group: usize) -> Field {
+    (0..texels).map(|o| if o % group == 0 { Vec3::ONE } else { Vec3::ZERO }).collect()
 }
 
 impl History {
-    /// For fields of this many unknowns.
-    pub fn new(texels: usize) -> History {
-        History { window: History::window(texels as u64), columns: Vec::new(), last: None, origin: None, ones: None }
+    /// For fields of this many unknowns, every `group`-th of which is irradiance.
+    pub fn new(texels: usize, group: usize) -> History {
+        let window = History::window(texels as u64);
+        History { window, columns: Vec::new(), last: None, origin: None, ones: None, group }
     }
 
     fn window(texels: u64) -> usize {
@@ -162,8 +170,8 @@ impl History {
     /// the slow modes large, and 1 everywhere, which in closed rooms of one albedo is the slowest mode.
     pub fn spectral_radius(&self, gap: f64) -> Option<f64> {
         let (origin, ones, (f, g)) = (self.origin.as_ref()?, self.ones.as_ref()?, self.last.as_ref()?);
-        let mut pairs = History { columns: Vec::new(), last: None, origin: None, ones: None, window: 2 };
-        let unit = vec![Vec3::ONE; ones.len()];
+        let mut pairs = History { window: 2, ..History::new(0, 1) };
+        let unit = unit(ones.len(), self.group);
         // At 0 residual and value are the same.
         pairs.add(difference(ones, &unit), ones.clone());
         pairs.add(difference(f, origin), difference(g, origin));
@@ -210,8 +218,8 @@ impl History {
     }
 
     /// The inverse of [`History::fields`]; `None` where they do not fit together.
-    pub fn from_fields(texels: usize, fields: Vec<Field>, noise: Vec<DVec3>) -> Option<History> {
-        let mut history = History::new(texels);
+    pub fn from_fields(texels: usize, group: usize, fields: Vec<Field>, noise: Vec<DVec3>) -> Option<History> {
+        let mut history = History::new(texels, group);
         let pairs = if fields.is_empty() { 0 } else { noise.len() + 1 };
         if fields.len() < 2 * pairs
             || fields.len() > 2 * pairs + 2

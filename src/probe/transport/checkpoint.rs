@@ -65,10 +65,11 @@ pub fn read(path: &Path, identity: &str, volume: &mut Volume) -> Result<Progress
         return Err(unusable("its irradiance is not that of this grid"));
     }
     let unknowns = volume.active_count() * volume.irradiance.unknowns();
+    let group = volume.irradiance.signed().map_or(1, |(group, _)| group);
     let history = match container.metadata.get("history") {
         None => None,
         Some(noise) => Some(
-            history(&container, noise, unknowns)
+            history(&container, noise, unknowns, group)
                 .ok_or_else(|| unusable("its earlier iterations are not of this grid"))?,
         ),
     };
@@ -80,10 +81,10 @@ pub fn read(path: &Path, identity: &str, volume: &mut Volume) -> Result<Progress
     Ok(Progress { solution, control, history, fields, is_partial: false })
 }
 
-fn history(container: &Container, noise: &str, unknowns: usize) -> Option<History> {
+fn history(container: &Container, noise: &str, unknowns: usize, group: usize) -> Option<History> {
     let noise: Vec<[f64; 3]> = serde_json::from_str(noise).ok()?;
     let fields = (0..).map_while(|i| field(container, &field_name(i))).collect();
-    History::from_fields(unknowns, fields, noise.into_iter().map(DVec3::from).collect())
+    History::from_fields(unknowns, group, fields, noise.into_iter().map(DVec3::from).collect())
 }
 
 /// Name of the tensor that holds one of the fields that the solver remembers.

@@ -3,6 +3,7 @@
 pub mod anderson;
 pub mod checkpoint;
 mod frames;
+mod in_order;
 pub mod operator;
 mod settings;
 pub mod solver;
@@ -12,7 +13,9 @@ mod tracing;
 pub mod truth;
 
 use self::operator::{Captures, Operator};
-pub use self::settings::{Acceleration, BounceSettings, FrameSettings, TracingFilter, TracingSettings, Transport};
+pub use self::settings::{
+    Acceleration, BounceSettings, FrameSettings, InOrderSettings, TracingFilter, TracingSettings, Transport,
+};
 use self::solver::{Progress, Solution};
 use super::Volume;
 
@@ -27,6 +30,7 @@ pub fn run<C: Captures>(
 ) -> Solution {
     match transport {
         Transport::Bounces(settings) => solver::solve(operator, settings, volume, progress, on_iteration),
+        Transport::InOrder(settings) => in_order::solve(operator, settings, volume, progress, on_iteration),
         Transport::Paths { .. } => {
             let solution = solver::solve(operator, &transport.iteration(), volume, progress, on_iteration);
             Solution { converged: true, ..solution }

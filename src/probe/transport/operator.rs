@@ -4,6 +4,7 @@
 //! with the method's own weights, G is the irradiance filter, B⁰ the radiance that hits reflect of light that did not pass
 //! through probes.
 
+use std::f32::consts::PI;
 use std::time::Instant;
 
 use glam::{Vec3, Vec3A};
@@ -99,8 +100,10 @@ impl<C: Captures> Operator<'_, C> {
 
     fn masks_of(&self, volume: &Volume, p: usize) -> Vec<u8> {
         let query = Query { volume, settings: self.query };
-        let mask = |s: &Surfel| query.stored_mask(&self.query_point(s, volume.positions[p]));
-        self.captures.with(p, |capture| capture.surfels.iter().map(mask).collect())
+        self.captures.with(p, |capture| {
+            let mask = |i| query.stored_mask(&self.query_point(capture, i, volume.positions[p]));
+            (0..capture.surfels.len()).map(mask).collect()
+        })
     }
 
     /// Irradiance of every probe from the outgoing radiance that the present irradiance gives; without `masks` from the
@@ -135,6 +138,9 @@ impl<C: Captures> Operator<'_, C> {
                 capture.surfels.iter().for_each(|s| {
                     albedo[s.texel as usize] += Vec3A::from(reflected_radiance(s.albedo(), ones));
                 });
+                if let Some((_, overshoot)) = volume.irradiance.signed() {
+                    return PI * overshoot * albedo.into_iter().fold(Vec3A::ZERO, Vec3A::max);
+                }
                 let mut reflected = vec![Vec3A::ZERO; self.kernel.rows()];
                 self.kernel.irradiance(&albedo, &mut reflected);
                 reflected.into_iter().fold(Vec3A::ZERO, Vec3A::max)
@@ -151,13 +157,23 @@ impl<C: Captures> Operator<'_, C> {
 
     /// One application at one active probe, with the masks of its own surfels.
     fn apply_to(&self, volume: &Volume, p: usize, masks: Option<&[u8]>) -> (Vec<Vec3A>, u64) {
-        let kernel = self.kernel;
         self.captures.with(p, |capture| {
             let mask = |i: usize| masks.map(|masks| masks[i]);
             let (radiance, non_finite) = self.outgoing(volume, p, capture, mask, self.gathers_emission);
-            let mut irradiance = vec![Vec3A::ZERO; kernel.rows()];
-            kernel.irradiance(&radiance, &mut irradiance);
-            (irradiance, non_finite)
+            (self.filtered(&radiance), non_finite)
+        })
+    }
+
+    /// The same for a probe that is updated alone: all threads share its surfels.
+    pub(super) fn update(&self, volume: &Volume, p: usize, masks: &Masks) -> (Vec<Vec3A>, u64) {
+        /// Surfels that are worth another thread's attention.
+        const CHUNK: usize = 512;
+        let query = Query { volume, settings: self.query };
+        self.captures.with(p, |capture| {
+            let leaves = |i| self.leaves(&query, capture, i, volume.positions[p], Some(masks.0[p][i]));
+            let found: Vec<Vec3> = (0..capture.surfels.len()).into_par_iter().with_min_len(CHUNK).map(leaves).collect();
+            let (radiance, non_finite) = add_up(capture, found.into_iter(), self.gathers_emission);
+            (self.filtered(&radiance), non_finite)
         })
     }
 
@@ -172,25 +188,30 @@ impl<C: Captures> Operator<'_, C> {
         emits: bool,
     ) -> (Vec<Vec3A>, u64) {
         let query = Query { volume, settings: self.query };
-        let mut radiance = if emits { capture.emitted_radiance() } else { vec![Vec3A::ZERO; capture.texels] };
-        let mut non_finite = 0;
-        for (i, surfel) in capture.surfels.iter().enumerate() {
-            let mut outgoing = surfel.direct_radiance;
-            if let Some(mask) = mask(i) {
-                let visibility = match mask {
-                    0 => Visibility::Stored,
-                    mask => Visibility::Exact(mask),
-                };
-                let weights = query.weights(&self.query_point(surfel, volume.positions[p]), visibility);
-                outgoing += reflected_radiance(surfel.albedo(), query.blend(&weights, surfel.oct()));
-            }
-            if outgoing.is_finite() {
-                radiance[surfel.texel as usize] += Vec3A::from(outgoing);
-            } else {
-                non_finite += 1;
-            }
-        }
-        (radiance, non_finite)
+        let leaves = |i| self.leaves(&query, capture, i, volume.positions[p], mask(i));
+        add_up(capture, (0..capture.surfels.len()).map(leaves), emits)
+    }
+
+    /// Radiance that leaves a surfel towards the probe at `position`. `mask`: the corners that it sees, 0 where that is not
+    /// known; `None` where it reflects no light of probes.
+    #[inline]
+    fn leaves(&self, query: &Query, capture: &ProbeCapture, i: usize, position: Vec3, mask: Option<u8>) -> Vec3 {
+        let surfel = &capture.surfels[i];
+        let visibility = match mask {
+            None => return surfel.direct_radiance,
+            Some(0) => Visibility::Stored,
+            Some(mask) => Visibility::Exact(mask),
+        };
+        let point = self.query_point(capture, i, position);
+        let weights = query.weights(&point, visibility);
+        surfel.direct_radiance + reflected_radiance(surfel.albedo(), query.blend(&weights, &point, surfel.oct()))
+    }
+
+    /// A probe's unknowns from the radiance in its texels.
+    fn filtered(&self, radiance: &[Vec3A]) -> Vec<Vec3A> {
+        let mut irradiance = vec![Vec3A::ZERO; self.kernel.rows()];
+        self.kernel.irradiance(radiance, &mut irradiance);
+        irradiance
     }
 
     /// Fills what the volume holds of radiance: all that surfaces send towards the probes, with what they emit where
@@ -221,19 +242,25 @@ impl<C: Captures> Operator<'_, C> {
         started.elapsed().as_secs_f64()
     }
 
-    /// How a probe asks for the light at a surfel. What the method does not look at is left zero.
-    fn query_point(&self, surfel: &Surfel, probe: Vec3) -> QueryPoint {
-        let normal = if self.query.needs_normal() { direction_from_oct(surfel.oct()) } else { Vec3::ZERO };
-        let view = if self.query.needs_view() { (probe - surfel.position).normalize_or_zero() } else { Vec3::ZERO };
-        QueryPoint { position: surfel.position, normal, facing: surfel.facing, view }
+    /// How a probe asks for the light at one of its surfels. What the method does not look at is left zero.
+    pub(super) fn query_point(&self, capture: &ProbeCapture, surfel: usize, probe: Vec3) -> QueryPoint {
+        let Surfel { position, facing, .. } = capture.surfels[surfel];
+        let normal =
+            if self.query.needs_normal() { direction_from_oct(capture.surfels[surfel].oct()) } else { Vec3::ZERO };
+        let geometric =
+            if self.query.needs_geometric() { direction_from_oct(capture.geometric[surfel].oct()) } else { Vec3::ZERO };
+        let view = if self.query.needs_view() { (probe - position).normalize_or_zero() } else { Vec3::ZERO };
+        QueryPoint { position, normal, geometric, facing, view }
     }
 
     /// Adds the emitted light that probes see themselves: from their rays and from the emitters sampled at their centres.
     /// Returns the mean luminance of the irradiance added, over all unknowns of active probes.
     pub fn add_emission(&self, volume: &mut Volume) -> f64 {
         let kernel = self.kernel;
-        let axes = volume.irradiance.axes();
+        let lobes = volume.irradiance.lobes();
         let states = &volume.states;
+        // Of unknowns with signs the first is the mean irradiance.
+        let group = volume.irradiance.signed().map_or(1, |(group, _)| group);
         let add = |p: usize, before: &mut dyn Iterator<Item = Vec3A>| {
             if states[p] != ProbeState::Active {
                 return None;
@@ -242,9 +269,12 @@ impl<C: Captures> Operator<'_, C> {
                 let mut emitted = vec![Vec3A::ZERO; kernel.rows()];
                 let mut energy = 0.0;
                 kernel.irradiance(&capture.emitted_radiance(), &mut emitted);
-                for ((value, (normal, _)), before) in emitted.iter_mut().zip(&axes).zip(before) {
-                    *value += Vec3A::from(capture.sampled_emitter_irradiance(*normal));
-                    energy += f64::from(luminance((*value).into()));
+                let sampled = lobes.of_samples(&capture.emitter_samples);
+                for (o, ((value, sampled), before)) in emitted.iter_mut().zip(sampled).zip(before).enumerate() {
+                    *value += sampled;
+                    if o % group == 0 {
+                        energy += f64::from(luminance((*value).into()));
+                    }
                     *value += before;
                 }
                 Some((emitted, energy))
@@ -252,9 +282,25 @@ impl<C: Captures> Operator<'_, C> {
         };
         // Summed in order, on one thread: the same for any number of threads.
         let energies: Vec<Option<f64>> = volume.irradiance.set_each(add);
-        let unknowns = energies.iter().flatten().count() * kernel.rows();
+        let unknowns = energies.iter().flatten().count() * kernel.rows() / group;
         energies.iter().flatten().sum::<f64>() / unknowns.max(1) as f64
     }
+}
+
+/// Radiance in every texel of a capture from that which leaves each of its surfels, in their order, and how many of these
+/// were not finite.
+#[inline]
+fn add_up(capture: &ProbeCapture, leaving: impl Iterator<Item = Vec3>, emits: bool) -> (Vec<Vec3A>, u64) {
+    let mut radiance = if emits { capture.emitted_radiance() } else { vec![Vec3A::ZERO; capture.texels] };
+    let mut non_finite = 0;
+    for (surfel, leaving) in capture.surfels.iter().zip(leaving) {
+        if leaving.is_finite() {
+            radiance[surfel.texel as usize] += Vec3A::from(leaving);
+        } else {
+            non_finite += 1;
+        }
+    }
+    (radiance, non_finite)
 }
 
 /// The unknowns that the volume's irradiance now stands for.

@@ -9,6 +9,8 @@ use crate::probe::capture::HitLight;
 pub enum Transport {
     /// Through the probes: their irradiance is asked at every hit, bounce after bounce.
     Bounces(BounceSettings),
+    /// Through the probes, one after another, each seeing the new values of those before it.
+    InOrder(InOrderSettings),
     /// By this many full paths from every hit: the truth at the probes, up to resolution and noise.
     Paths { paths: u32 },
     /// Through the probes, in frames of new rays that are mixed into what came before.
@@ -89,6 +91,21 @@ pub struct BounceSettings {
     pub tolerance: f32,
 }
 
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct InOrderSettings {
+    /// Stop when no probe changes by this share of its largest unknown.
+    pub tolerance: f32,
+    /// Most passes over all probes.
+    pub most: u32,
+}
+
+impl Default for InOrderSettings {
+    fn default() -> Self {
+        InOrderSettings { tolerance: 1e-3, most: 256 }
+    }
+}
+
 /// Whether iterations are combined so that few do for many bounces. With a number of bounces they never are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -143,7 +160,9 @@ impl Transport {
     pub fn hit_light(&self) -> HitLight {
         match self {
             Transport::Bounces(BounceSettings { max_bounces: Some(0), .. }) => HitLight::None,
-            Transport::Bounces(_) | Transport::Frames(_) | Transport::Tracing(_) => HitLight::Direct,
+            Transport::Bounces(_) | Transport::InOrder(_) | Transport::Frames(_) | Transport::Tracing(_) => {
+                HitLight::Direct
+            }
             Transport::Paths { paths } => HitLight::Paths(*paths),
         }
     }
@@ -168,6 +187,11 @@ impl Transport {
         matches!(self, Transport::Frames(_))
     }
 
+    /// Whether irradiance is mixed with what it was before, in the domain in which it is stored.
+    pub fn mixes_samples(&self) -> bool {
+        matches!(self, Transport::Frames(_))
+    }
+
     /// Whether it reads the light of surfaces in the probes' light fields.
     pub fn needs_light_field(&self) -> bool {
         matches!(self, Transport::Tracing(_))
@@ -181,7 +205,7 @@ impl Transport {
     /// Iterations after which there are no more.
     pub fn most(&self) -> u32 {
         match self {
-            Transport::Bounces(_) | Transport::Paths { .. } => self.iteration().most(),
+            Transport::Bounces(_) | Transport::InOrder(_) | Transport::Paths { .. } => self.iteration().most(),
             Transport::Frames(settings) => settings.most,
             Transport::Tracing(settings) => settings.iterations,
         }
@@ -191,7 +215,7 @@ impl Transport {
     pub fn max_bounces(&self) -> Option<u32> {
         match self {
             Transport::Bounces(_) | Transport::Paths { .. } => self.iteration().max_bounces,
-            Transport::Frames(_) | Transport::Tracing(_) => None,
+            Transport::InOrder(_) | Transport::Frames(_) | Transport::Tracing(_) => None,
         }
     }
 
@@ -203,7 +227,9 @@ impl Transport {
     /// Iterations that light losing all but `ratio` at every reflection is expected to take.
     pub fn expected_iterations(&self, ratio: f64) -> u32 {
         match self {
-            Transport::Bounces(_) | Transport::Paths { .. } => self.iteration().expected_iterations(ratio),
+            Transport::Bounces(_) | Transport::InOrder(_) | Transport::Paths { .. } => {
+                self.iteration().expected_iterations(ratio)
+            }
             Transport::Frames(settings) => {
                 // To a hundredth: each frame mixes 1 − hysteresis of a reflection in.
                 let rate = (1.0 - f64::from(settings.hysteresis)) * (1.0 - ratio);
@@ -225,6 +251,7 @@ impl Transport {
             Transport::Bounces(_) | Transport::Paths { .. } | Transport::Tracing(_) => {
                 format!("{done} iterations; what further bounces would add is below the tolerance")
             }
+            Transport::InOrder(_) => format!("{done} passes; the last changed no probe by more than the tolerance"),
             Transport::Frames(_) => format!("{done} frames; their variability no longer falls"),
         }
     }
@@ -233,6 +260,7 @@ impl Transport {
     pub fn limit_key(&self) -> &'static str {
         match self {
             Transport::Bounces(_) | Transport::Paths { .. } => "transport.bounces.max_iterations",
+            Transport::InOrder(_) => "transport.in_order.most",
             Transport::Frames(_) => "transport.frames.most",
             Transport::Tracing(_) => "transport.tracing.iterations",
         }
@@ -242,6 +270,9 @@ impl Transport {
     pub fn iteration(&self) -> BounceSettings {
         match self {
             Transport::Bounces(settings) => settings.clone(),
+            Transport::InOrder(InOrderSettings { tolerance, most }) => {
+                BounceSettings { max_iterations: *most, tolerance: *tolerance, ..never() }
+            }
             Transport::Paths { .. } => BounceSettings { max_bounces: Some(1), ..BounceSettings::default() },
             Transport::Frames(_) | Transport::Tracing(_) => never(),
         }
@@ -252,6 +283,10 @@ impl Transport {
         match self {
             Transport::Bounces(settings) => Transport::Bounces(BounceSettings {
                 max_bounces: None,
+                tolerance: (share * settings.tolerance).max(least),
+                ..settings.clone()
+            }),
+            Transport::InOrder(settings) => Transport::InOrder(InOrderSettings {
                 tolerance: (share * settings.tolerance).max(least),
                 ..settings.clone()
             }),
@@ -281,6 +316,13 @@ impl Transport {
                 let holds = tolerance.is_finite() && *tolerance >= 0.0;
                 let text = "use a finite number, not negative";
                 rule("transport.bounces.tolerance", tolerance.to_string(), holds, text);
+            }
+            Transport::InOrder(InOrderSettings { tolerance, most }) => {
+                let holds = tolerance.is_finite() && *tolerance >= 0.0;
+                let text = "use a finite number, not negative";
+                rule("transport.in_order.tolerance", tolerance.to_string(), holds, text);
+                let holds = (1..=1 << 20).contains(most);
+                rule("transport.in_order.most", most.to_string(), holds, "use 1 to 1048576");
             }
             Transport::Frames(FrameSettings { hysteresis, window, fall, least, most }) => {
                 let holds = (0.0..1.0).contains(hysteresis);

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::anderson::History;
+use super::anderson::{History, unit};
 use super::operator::{Captures, Field, Masks, Operator, field_of, store};
 use super::settings::{Acceleration, BounceSettings};
 use crate::math::color::luminance;
@@ -108,7 +108,7 @@ pub struct Control {
     stalled: u32,
     smallest_residual: Option<f64>,
     /// 2-norm of the last change.
-    last_norm: Option<f64>,
+    pub(super) last_norm: Option<f64>,
 }
 
 /// Between two iterations: what a checkpoint must hold besides the volume's irradiance.
@@ -146,6 +146,7 @@ pub fn solve<C: Captures>(
     mut on_iteration: impl FnMut(&Progress, &Volume),
 ) -> Solution {
     let is_linear = operator.is_linear(volume);
+    let signed = volume.irradiance.signed().map(|(group, _)| group);
     let mut masks: Option<Masks> = None;
     let most = settings.most();
     // Emission that is gathered passes through the probes before it is reflected at all, other light does not. Where
@@ -170,25 +171,25 @@ pub fn solve<C: Captures>(
             0 => (operator.gathered_emission(volume), 0),
             _ => operator.apply(volume, masks),
         };
-        let change = measure(&x, &g);
+        let change = measure(&x, &g, signed);
         let Progress { solution, control, history, .. } = &mut progress;
         let rising = solution
             .last_change
             .map_or([false; 3], |last| [0, 1, 2].map(|c| change.largest_change[c] as f64 > last[c]));
         solution.add(index, &change, non_finite, control.accelerating);
         if settings.may_accelerate() {
-            history.get_or_insert_with(|| History::new(x.len())).push(&x, g.clone());
+            history.get_or_insert_with(|| History::new(x.len(), signed.unwrap_or(1))).push(&x, g.clone());
         }
         if index > first {
             let gap = solution.norm_bound().map_or(f64::from(f32::EPSILON), |norm| 1.0 - norm);
             let ritz = history.as_ref().and_then(|history| history.spectral_radius(gap));
-            judge(solution, control, &change, ritz, is_linear, settings);
+            judge(solution, control, &change, ritz, (is_linear, signed.is_some()), settings);
         }
         let asks_ones = |history: &History| {
             control.accelerating && is_linear && !history.knows_image_of_ones() && !solution.converged
         };
         if let Some(known) = history.as_mut().filter(|history| asks_ones(history))
-            && let Some(image) = image_of_ones(operator, volume, masks, known.origin())
+            && let Some(image) = image_of_ones(operator, volume, masks, known.origin(), signed.unwrap_or(1))
         {
             known.set_image_of_ones(image);
             solution.probing_applications += 1;
@@ -241,6 +242,7 @@ fn image_of_ones<C: Captures>(
     volume: &mut Volume,
     masks: Option<&Masks>,
     origin: Option<&Field>,
+    group: usize,
 ) -> Option<Field> {
     let origin = origin?;
     // As large as what is subtracted, so that little is lost in the difference.
@@ -248,7 +250,7 @@ fn image_of_ones<C: Captures>(
     if scale <= 0.0 || !scale.is_finite() {
         return None;
     }
-    store(volume, &vec![Vec3::splat(scale); origin.len()]);
+    store(volume, &unit(origin.len(), group).into_iter().map(|one| one * scale).collect::<Field>());
     let (g, _) = operator.apply(volume, masks);
     Some(g.iter().zip(origin).map(|(g, origin)| (*g - *origin) / scale).collect())
 }
@@ -273,7 +275,7 @@ fn judge(
     control: &mut Control,
     change: &Change,
     ritz: Option<f64>,
-    is_linear: bool,
+    (is_linear, signed): (bool, bool),
     settings: &BounceSettings,
 ) {
     let changed = change.largest_change.as_dvec3();
@@ -301,7 +303,11 @@ fn judge(
     solution.last_change = Some(changed.to_array());
     control.settled = changed.max_element() == 0.0 || missing <= tolerance || at_rounding;
     solution.converged = control.settled && change.negative == 0;
-    if is_linear && let Some(norm) = solution.operator_norm {
+    // The norm is one of irradiance, and bounds unknowns only where these are irradiance.
+    if is_linear
+        && !signed
+        && let Some(norm) = solution.operator_norm
+    {
         // One iteration after x shrinks its error by the norm.
         let bound = |c: usize| if changed[c] > 0.0 { changed[c] * norm[c] / (1.0 - norm[c]) } else { 0.0 };
         let bound = [0, 1, 2].map(bound).into_iter().fold(0.0, f64::max);
@@ -328,17 +334,23 @@ fn missing_iterations(ratio: f64, missing: f64, tolerance: f64) -> f64 {
 }
 
 /// How much of a field an iteration has changed.
-fn measure(x: &Field, g: &Field) -> Change {
+///
+/// `signed`: every so manieth unknown, from the first on, is irradiance, and the others may be negative; `None` where all
+/// are irradiance.
+fn measure(x: &Field, g: &Field, signed: Option<usize>) -> Change {
+    let group = signed.unwrap_or(1);
     let mut found = Change { largest_change: Vec3::ZERO, norm: 0.0, largest: Vec3::ZERO, energy: 0.0, negative: 0 };
-    for (x, g) in x.iter().zip(g) {
+    for (o, (x, g)) in x.iter().zip(g).enumerate() {
         let change = *g - *x;
         found.largest_change = found.largest_change.max(change.abs());
         found.norm += change.as_dvec3().length_squared();
         found.largest = found.largest.max(g.abs());
-        found.negative += u64::from(g.cmplt(Vec3::ZERO).any());
-        found.energy += f64::from(luminance(*g));
+        found.negative += u64::from(signed.is_none() && g.cmplt(Vec3::ZERO).any());
+        if o % group == 0 {
+            found.energy += f64::from(luminance(*g));
+        }
     }
     found.norm = found.norm.sqrt();
-    found.energy /= g.len().max(1) as f64;
+    found.energy /= g.len().div_ceil(group).max(1) as f64;
     found
 }

@@ -16,6 +16,7 @@ use crate::probe::query::{QuerySettings, VisibilityTest};
 use crate::probe::store::encode::ColorFormat;
 use crate::probe::store::irradiance::{IrradianceCurve, OctahedralStore};
 use crate::probe::store::kernel::Directions;
+use crate::probe::store::sh::ShStore;
 use crate::probe::store::{IrradianceStore, Occlusion};
 
 const DIRECT: f32 = 0.25;
@@ -29,11 +30,17 @@ struct World {
 
 impl World {
     fn new(albedo: f32) -> World {
-        let store = IrradianceStore::Octahedral(OctahedralStore {
-            resolution: 2,
-            format: ColorFormat::F32,
-            curve: IrradianceCurve::Linear,
-        });
+        World::with(
+            albedo,
+            IrradianceStore::Octahedral(OctahedralStore {
+                resolution: 2,
+                format: ColorFormat::F32,
+                curve: IrradianceCurve::Linear,
+            }),
+        )
+    }
+
+    fn with(albedo: f32, store: IrradianceStore) -> World {
         let texels = 4u32;
         let surface = SurfacePoint { albedo: Vec3::splat(albedo), ..SurfacePoint::in_space(Vec3::X, Vec3::NEG_X) };
         let capture = ProbeCapture {
@@ -62,7 +69,7 @@ impl World {
         }
         let operator = Operator { captures: &self.captures, kernel: &kernel, query: &query, gathers_emission };
         let solution = run(transport, &operator, &mut self.volume, Progress::default(), |_, _| {});
-        let values: Vec<f32> = self.volume.irradiance.probe(0).map(|e| e.x).collect();
+        let values = [Vec3::X, Vec3::NEG_Y, Vec3::new(0.6, 0.64, 0.48)].map(|n| self.volume.irradiance.of(0, n).x);
         // Albedos of texels are dithered.
         assert!(values.iter().all(|e| (e / values[0] - 1.0).abs() < 1e-4), "{values:?}");
         (values[0], solution)
@@ -128,4 +135,25 @@ fn paths_leave_nothing_to_iterate() {
     // What captures of paths hold is all there is.
     assert_near(found, PI * (EMITTED + DIRECT), 0.9);
     assert!(solution.converged && solution.bounces.len() == 1);
+}
+
+#[test]
+fn harmonics_settle_like_maps() {
+    for (albedo, acceleration) in [
+        (0.5, Acceleration::Never),
+        (0.9, Acceleration::Auto),
+        (0.99, Acceleration::Always),
+        (0.999, Acceleration::Auto),
+    ] {
+        for presampled in [None, Some(8)] {
+            let mut world = World::with(albedo, IrradianceStore::Sh9(ShStore { format: ColorFormat::F32, presampled }));
+            let (found, solution) = world.irradiance(&bounces(None, acceleration), true);
+            assert!(solution.converged, "{solution:?}");
+            assert_near(found, PI * (DIRECT + EMITTED) / (1.0 - albedo), albedo);
+            // The mean irradiance, whatever the number of unknowns.
+            let energy = solution.bounces.last().map_or(0.0, |b| b.energy);
+            assert!((energy / f64::from(found) - 1.0).abs() < 1e-3, "{energy} for {found}");
+            assert_eq!(solution.negative_texels, 0);
+        }
+    }
 }

@@ -40,7 +40,7 @@ impl Truth {
     ) -> Truth {
         let resampling = settings.rays.resampling();
         let kernel = volume.irradiance.kernel(&settings.rays.directions());
-        let axes = volume.irradiance.axes();
+        let lobes = volume.irradiance.lobes();
         let contacts = Contacts::of_points(world.scene, &volume.positions);
         let bar = progress.stage("path-traced probes", RUNS as usize * volume.active_count());
         let run = |run: u64| -> Vec<Vec<Vec3A>> {
@@ -49,6 +49,7 @@ impl Truth {
                 settings,
                 distance_clamp_m: None,
                 hit_light: HitLight::Paths(paths),
+                keeps_geometric: false,
                 sees: false,
                 resampling: resampling.as_ref(),
                 seed: seed.wrapping_add((run + 1).wrapping_mul(SEED_STEP)),
@@ -63,9 +64,8 @@ impl Truth {
                 traced.surfels.iter().for_each(|s| radiance[s.texel as usize] += Vec3A::from(s.direct_radiance));
                 let mut irradiance = vec![Vec3A::ZERO; kernel.rows()];
                 kernel.irradiance(&radiance, &mut irradiance);
-                for (value, (normal, _)) in irradiance.iter_mut().zip(&axes) {
-                    *value += Vec3A::from(traced.sampled_emitter_irradiance(*normal));
-                }
+                let sampled = lobes.of_samples(&traced.emitter_samples);
+                irradiance.iter_mut().zip(sampled).for_each(|(value, sampled)| *value += sampled);
                 irradiance
             };
             (0..volume.states.len()).into_par_iter().map(probe).collect()

@@ -86,17 +86,18 @@ pub struct ProbesReport {
 fn matches(base: &Volume, candidate: &Volume) -> Vec<(ProbeIndex, ProbeIndex)> {
     let (grid, other) = (&base.grid, &candidate.grid);
     let spacing = grid.spacing().as_dvec3();
-    // Grid points of the candidate in steps of the base's grid.
+    // Grid points of the candidate in half steps of the base's grid: cells of mixed grids have their middles there too.
+    let halves = |step: DVec3| (2.0 * step).round().as_ivec3();
     let mut points: HashMap<IVec3, ProbeIndex> = HashMap::new();
-    for index in (0..other.probe_count() as u32).map(ProbeIndex) {
-        let world = other.origin_world() + other.coordinate(index).as_dvec3() * other.spacing().as_dvec3();
+    for index in other.probes() {
+        let world = other.origin_world() + other.steps(index).as_dvec3() * other.spacing().as_dvec3();
         let step = (world - grid.origin_world()) / spacing;
-        if (step - step.round()).abs().max_element() <= SAME_POINT {
-            points.insert(step.round().as_ivec3(), index);
+        if (step - halves(step).as_dvec3() / 2.0).abs().max_element() <= SAME_POINT {
+            points.insert(halves(step), index);
         }
     }
-    let all = (0..grid.probe_count() as u32).map(ProbeIndex);
-    all.filter_map(|index| Some((index, *points.get(&grid.coordinate(index).as_ivec3())?))).collect()
+    let found = |index| Some((index, *points.get(&halves(grid.steps(index).as_dvec3()))?));
+    grid.probes().filter_map(found).collect()
 }
 
 fn row(base: &Volume, candidate: &Volume, (a, b): (ProbeIndex, ProbeIndex), directions: &[Vec3]) -> ProbeRow {

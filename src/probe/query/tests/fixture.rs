@@ -10,6 +10,7 @@ use crate::probe::store::encode::ColorFormat;
 use crate::probe::store::irradiance::IrradianceCurve;
 use crate::probe::store::map::OctahedralMaps;
 use crate::probe::store::surface::{Facing, SurfaceVisibility, TableTest};
+use crate::probe::store::tiles::{TileStore, TilesBuilder};
 use crate::probe::store::{Irradiance, Occlusion};
 
 /// Probe (0,0,0), metres. Not the origin, so that a forgotten subtraction shows.
@@ -51,8 +52,9 @@ impl Fixture {
     /// Stored values by probe, column and row; columns and rows count from the border, 0 to 5.
     pub fn store(&mut self, curve: IrradianceCurve, texel: impl Fn(usize, usize, usize) -> [f32; 3]) {
         let mut stored = maps(self.volume.grid.probe_count(), curve);
-        let Irradiance::Maps { maps, .. } = &mut stored;
-        fill(maps, |p, c, r| Vec3A::from_array(texel(p, c, r)));
+        if let Irradiance::Maps { maps, .. } = &mut stored {
+            fill(maps, |p, c, r| Vec3A::from_array(texel(p, c, r)));
+        }
         self.volume.irradiance = stored;
     }
 
@@ -62,6 +64,16 @@ impl Fixture {
         let mut maps = OctahedralMaps::new(self.volume.grid.probe_count(), RESOLUTION, 1, Vec2::ZERO);
         fill(&mut maps, |p, c, r| Vec2::from_array(texel(p, c, r)));
         self.volume.occlusion = Occlusion::Moments(maps);
+    }
+
+    /// Mean and deviation of distance as shares of the way to the box of one spacing, by probe, column and row as in
+    /// [`Self::store`].
+    pub fn tiles(&mut self, power: f32, floor: f32, texel: impl Fn(usize, usize, usize) -> [f32; 2]) {
+        self.settings.test = VisibilityTest::Chebyshev { power, floor };
+        let store = TileStore { resolution: RESOLUTION, ..TileStore::default() };
+        let mut tiles = TilesBuilder::new(&store, &self.volume.grid, 1).finish();
+        fill(&mut tiles.maps, |p, c, r| Vec2::from_array(texel(p, c, r)));
+        self.volume.occlusion = Occlusion::Tiles(tiles);
     }
 
     /// A table of visibility at surfaces with two voxels per axis and cell. For each cell its entries, sorted: key
@@ -114,5 +126,5 @@ fn fill<T: Copy>(maps: &mut OctahedralMaps<T>, texel: impl Fn(usize, usize, usiz
 
 /// A point whose surface faces along its shading normal.
 pub fn point(position: Vec3, normal: Vec3, view: Vec3) -> QueryPoint {
-    QueryPoint { position, normal, facing: Facing::of(normal), view }
+    QueryPoint { position, normal, geometric: normal, facing: Facing::of(normal), view }
 }

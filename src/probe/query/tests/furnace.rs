@@ -22,11 +22,12 @@ const TOLERANCE: f32 = ROUNDINGS / (1 << 24) as f32;
 /// Corners 0, 3, 5 and 6: at least one of them on every face and on every edge of the cell.
 const TETRAHEDRON: u8 = 0b0110_1001;
 
-const DIRECTIONS: [DirectionWeight; 4] = [
+const DIRECTIONS: [DirectionWeight; 5] = [
     DirectionWeight::Uniform,
     DirectionWeight::Cosine { floor: 0.05 },
     DirectionWeight::Wrap { offset: 0.0 },
     DirectionWeight::Wrap { offset: 0.2 },
+    DirectionWeight::Eccentric { kappa: 0.9 },
 ];
 
 /// Points in and around the hull of `divisions` probes, with normals and views of all kinds.
@@ -70,7 +71,7 @@ fn furnace(divisions: [u32; 3]) -> Fixture {
     fixture
 }
 
-/// Sets one of the visibility tests: none, moments, or the table of surfaces.
+/// Sets one of the visibility tests: none, moments, tiles, or the table of surfaces.
 fn set_test(fixture: &mut Fixture, test: usize, cells: usize) {
     // Where there is one layer, only the lower four corners weigh.
     let least = if fixture.volume.grid.divisions().z == 1 { 0b0000_1111 } else { TETRAHEDRON };
@@ -80,6 +81,7 @@ fn set_test(fixture: &mut Fixture, test: usize, cells: usize) {
     match test {
         0 => {}
         1 => fixture.moments(3.0, 0.05, |p, c, r| [0.3 + 0.1 * (p + c) as f32, 0.2 + 0.05 * r as f32]),
+        3 => fixture.tiles(1.0, 0.0, |p, c, r| [0.9 - 0.1 * (p + r) as f32 / 8.0, 0.4 + 0.02 * c as f32]),
         2 => fixture.moments(1.0, 0.0, |p, c, r| [2.5 - 0.1 * (p + r) as f32, 0.4 + 0.02 * c as f32]),
         _ => fixture.surface(&vec![&table[..]; cells], &[]),
     }
@@ -124,7 +126,7 @@ fn every_combination_of_settings_returns_what_all_probes_hold() {
     for (divisions, cells) in [([2, 2, 2], 1), ([3, 2, 2], 2), ([2, 3, 1], 2)] {
         let points = points(divisions);
         for (curve, stored) in [(IrradianceCurve::Linear, IRRADIANCE), (IrradianceCurve::Gamma5Over2Pi, fifth_roots)] {
-            for test in 0..4 {
+            for test in 0..5 {
                 let mut fixture = furnace(divisions);
                 fixture.store(curve, |_, _, _| stored);
                 set_test(&mut fixture, test, cells);

@@ -41,7 +41,7 @@ impl Linear {
 #[test]
 fn a_stiff_linear_system_is_solved_in_a_few_steps() {
     let system = Linear::new(4, 0.999);
-    let mut history = History::new(8);
+    let mut history = History::new(8, 1);
     let mut x = vec![Vec3::ZERO; 8];
     // Three distinct eigenvalues, and one step to begin with; rounding costs another or two.
     for _ in 0..6 {
@@ -68,7 +68,7 @@ fn a_stiff_linear_system_is_solved_in_a_few_steps() {
 #[test]
 fn plain_channels_stay_plain_and_negative_texels_fall_back() {
     let system = Linear::new(2, 0.9);
-    let mut history = History::new(4);
+    let mut history = History::new(4, 1);
     let mut x = vec![Vec3::ZERO; 4];
     for _ in 0..3 {
         let g = system.apply(&x);
@@ -84,7 +84,7 @@ fn plain_channels_stay_plain_and_negative_texels_fall_back() {
 #[test]
 fn a_restored_history_goes_on_as_the_old_one() {
     let system = Linear::new(2, 0.99);
-    let mut history = History::new(4);
+    let mut history = History::new(4, 1);
     let mut x = vec![Vec3::ZERO; 4];
     for _ in 0..3 {
         history.push(&x, system.apply(&x));
@@ -92,8 +92,8 @@ fn a_restored_history_goes_on_as_the_old_one() {
     }
     let (fields, noise) = history.fields();
     let fields: Vec<Field> = fields.into_iter().cloned().collect();
-    assert_eq!(History::from_fields(4, fields.clone(), noise.clone()).as_ref(), Some(&history));
-    assert_eq!(History::from_fields(3, fields, noise), None);
+    assert_eq!(History::from_fields(4, 1, fields.clone(), noise.clone()).as_ref(), Some(&history));
+    assert_eq!(History::from_fields(3, 1, fields, noise), None);
 }
 
 #[test]

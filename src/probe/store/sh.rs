@@ -1,0 +1,312 @@
+//! Irradiance as nine coefficients of spherical harmonics a probe.
+//!
+//! `E(n) = Σ c_j·Y_j(n)` with the functions of [`harmonics`]. The solver's unknowns are `c_j·Y₀`: the first is the mean
+//! irradiance, and all have its unit. Where it is presampled, shading reads an octahedral map of the sum instead, of
+//! R11G11B10F texels with a border of one: values below 0, which nine coefficients give beside bright lights, become 0.
+
+use glam::{Vec2, Vec3, Vec3A};
+use half::f16;
+use rayon::prelude::*;
+use safetensors::Dtype;
+use serde::{Deserialize, Serialize};
+
+use super::encode::{ColorFormat, decode_colors, encode_colors, scale_for};
+use super::map::{OctahedralMaps, fill_with_border};
+use crate::math::harmonics::{self, COUNT, Y0};
+use crate::math::octahedral::{direction_from_oct, texel_direction};
+use crate::probe::container::{Container, EncodingLosses};
+
+/// How coefficients are stored and read.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ShStore {
+    /// `F16` or `F32`.
+    pub format: ColorFormat,
+    /// Interior texels per side of the maps that shading reads; `None`: it evaluates the functions.
+    pub presampled: Option<usize>,
+}
+
+impl Default for ShStore {
+    fn default() -> Self {
+        ShStore { format: ColorFormat::F32, presampled: None }
+    }
+}
+
+/// Texels around the maps that shading reads.
+const BORDER: usize = 1;
+
+/// Format of the maps that shading reads.
+const PRESAMPLED: ColorFormat = ColorFormat::R11G11B10F;
+
+/// ∫|K| ÷ ∫K of the kernel K = 3/32 + x/2 + 15/32·x² that the bands 0 to 2 leave of a clamped cosine: it is negative
+/// between the cosines −0.824 and −0.243, and 1.0615 is rounded up. No irradiance is larger than this times π times the
+/// largest radiance.
+const OVERSHOOT: f32 = 1.062;
+
+impl ShStore {
+    /// Bytes of one probe in the layout that shading uses.
+    pub fn runtime_bytes(&self) -> usize {
+        match self.presampled {
+            Some(resolution) => (resolution + 2 * BORDER).pow(2) * PRESAMPLED.bytes_per_texel(),
+            None => COUNT * self.format.bytes_per_texel(),
+        }
+    }
+
+    /// Most memory that one probe takes while it is baked and encoded.
+    pub fn working_bytes(&self) -> u64 {
+        let texels = COUNT + self.presampled.map_or(0, |resolution| (resolution + 2 * BORDER).pow(2));
+        // Four floats each, and as many of an iteration's result.
+        (texels * 2 * size_of::<Vec3A>()) as u64
+    }
+
+    /// Largest relative error of what shading reads.
+    pub fn rounding(&self) -> f64 {
+        self.presampled.map_or(self.format, |_| PRESAMPLED).rounding()
+    }
+
+    /// Calls `rule(key, value, holds, rule)` for every number in it.
+    pub fn check(&self, most_texels: usize, rule: &mut dyn FnMut(&'static str, String, bool, &'static str)) {
+        let (key, format) = ("store.irradiance.sh9.format", self.format);
+        rule(key, format.name().to_owned(), !format.is_packed(), "coefficients have signs: use f16 or f32");
+        if let Some(n) = self.presampled {
+            let holds = (1..=most_texels).contains(&n);
+            rule("store.irradiance.sh9.presampled", n.to_string(), holds, "use 1 to 1024 texels, or None");
+        }
+    }
+}
+
+/// Coefficients of all probes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShIrradiance {
+    /// [`COUNT`] a probe, W·m⁻².
+    coefficients: Vec<Vec3A>,
+    /// That of the file.
+    format: ColorFormat,
+    /// What shading reads, W·m⁻².
+    presampled: Option<OctahedralMaps<Vec3A>>,
+}
+
+/// A direction, made ready once for all probes that are asked around it.
+#[derive(Debug, Clone, Copy)]
+pub struct Functions([f32; COUNT]);
+
+impl ShIrradiance {
+    pub fn zeros(store: &ShStore, probes: usize) -> ShIrradiance {
+        let maps = |resolution| OctahedralMaps::new(probes, resolution, BORDER, Vec3A::ZERO);
+        let presampled = store.presampled.map(maps);
+        ShIrradiance { coefficients: vec![Vec3A::ZERO; COUNT * probes], format: store.format, presampled }
+    }
+
+    pub fn store(&self) -> ShStore {
+        ShStore { format: self.format, presampled: self.presampled.as_ref().map(|maps| maps.resolution) }
+    }
+
+    /// Most by which irradiance may exceed π times the largest radiance, as a factor.
+    pub fn overshoot(&self) -> f32 {
+        OVERSHOOT
+    }
+
+    fn of_probe(&self, probe: usize) -> &[Vec3A] {
+        &self.coefficients[probe * COUNT..(probe + 1) * COUNT]
+    }
+
+    /// Irradiance of a probe around the direction `oct`, W·m⁻².
+    pub fn at(&self, probe: usize, oct: Vec2) -> Vec3A {
+        self.sum(oct, [(probe, 1.0)].into_iter(), |e| e)
+    }
+
+    /// Σ weight · forward(irradiance around `oct`) over some probes.
+    #[inline]
+    pub fn sum(&self, oct: Vec2, parts: impl Iterator<Item = (usize, f32)>, forward: impl Fn(Vec3A) -> Vec3A) -> Vec3A {
+        match &self.presampled {
+            Some(maps) => {
+                let taps = maps.taps(oct);
+                parts.map(|(probe, weight)| forward(maps.sample(probe, &taps)) * weight).sum()
+            }
+            None => {
+                let functions = Functions(harmonics::basis(direction_from_oct(oct)));
+                parts.map(|(probe, weight)| forward(evaluate(self.of_probe(probe), &functions)) * weight).sum()
+            }
+        }
+    }
+
+    /// The unknowns of one probe, W·m⁻².
+    pub fn probe(&self, probe: usize) -> impl Iterator<Item = Vec3A> + '_ {
+        self.of_probe(probe).iter().map(|c| *c * Y0)
+    }
+
+    /// Irradiance along `directions` from the unknowns of a probe.
+    pub fn along<'d>(unknowns: &'d [Vec3A], directions: &'d [Vec3]) -> impl Iterator<Item = Vec3A> + 'd {
+        directions.iter().map(|&d| evaluate(unknowns, &Functions(harmonics::basis(d))) / Y0)
+    }
+
+    /// The unknowns that directional samples give, each radiance ÷ density, W·m⁻².
+    pub fn of_samples(samples: &[(Vec3, Vec3)]) -> Vec<Vec3A> {
+        let mut unknowns = vec![Vec3A::ZERO; COUNT];
+        for (direction, light) in samples {
+            let y = harmonics::basis(*direction);
+            for (j, unknown) in unknowns.iter_mut().enumerate() {
+                *unknown += Vec3A::from(*light) * (y[j] * harmonics::COSINE[j] * Y0);
+            }
+        }
+        unknowns
+    }
+
+    /// As [`super::Irradiance::set_each`].
+    pub fn set_each<R: Send>(
+        &mut self,
+        values: impl Fn(usize, &mut dyn Iterator<Item = Vec3A>) -> Option<(Vec<Vec3A>, R)> + Sync,
+    ) -> Vec<Option<R>> {
+        let set = |(probe, coefficients): (usize, &mut [Vec3A])| {
+            let before: Vec<Vec3A> = coefficients.iter().map(|c| *c * Y0).collect();
+            let (values, result) = values(probe, &mut before.into_iter())?;
+            coefficients.iter_mut().zip(values).for_each(|(c, value)| *c = value / Y0);
+            Some(result)
+        };
+        let results = self.coefficients.par_chunks_mut(COUNT).enumerate().map(set).collect();
+        self.presample();
+        results
+    }
+
+    /// Sets the unknowns of one probe.
+    pub fn set_probe(&mut self, probe: usize, values: &[Vec3A]) {
+        let coefficients = &mut self.coefficients[probe * COUNT..(probe + 1) * COUNT];
+        coefficients.iter_mut().zip(values).for_each(|(c, value)| *c = *value / Y0);
+        if let Some(maps) = &mut self.presampled {
+            let functions = texel_functions(maps.resolution);
+            sample(coefficients, &functions, maps.resolution, maps.probe_mut(probe));
+        }
+    }
+
+    /// Fills the maps that shading reads.
+    fn presample(&mut self) {
+        let Some(maps) = &mut self.presampled else { return };
+        let (resolution, per_probe) = (maps.resolution, maps.texels_per_probe());
+        let functions = texel_functions(resolution);
+        let probes = maps.texels.par_chunks_mut(per_probe).zip(self.coefficients.par_chunks(COUNT));
+        probes.for_each(|(map, coefficients)| sample(coefficients, &functions, resolution, map));
+    }
+
+    /// Those of some probes, in this order.
+    pub fn of_probes(&self, probes: &[usize]) -> ShIrradiance {
+        ShIrradiance {
+            coefficients: probes.iter().flat_map(|&probe| self.of_probe(probe).iter().copied()).collect(),
+            format: self.format,
+            presampled: self.presampled.as_ref().map(|maps| maps.of_probes(probes)),
+        }
+    }
+
+    /// Coefficients, for checkpoints; inverse of [`Self::restore`].
+    pub fn stored(&self) -> impl ExactSizeIterator<Item = Vec3> + '_ {
+        self.coefficients.iter().map(|&c| c.into())
+    }
+
+    /// Puts back what [`Self::stored`] gave; false where it is of another volume.
+    pub fn restore(&mut self, stored: &[Vec3]) -> bool {
+        let fits = stored.len() == self.coefficients.len();
+        if fits {
+            self.coefficients = stored.iter().map(|&c| c.into()).collect();
+            self.presample();
+        }
+        fits
+    }
+
+    /// In words.
+    pub fn describe(&self) -> String {
+        let read = match &self.presampled {
+            Some(maps) => format!(", presampled to {0}×{0} texels, {1}", maps.resolution, PRESAMPLED.name()),
+            None => String::new(),
+        };
+        format!("{COUNT} coefficients of spherical harmonics, {}{read}", self.format.name())
+    }
+
+    /// Writes its tensor.
+    pub fn write(&self, container: &mut Container, losses: &mut EncodingLosses) {
+        let largest = |values: &[Vec3A]| values.iter().map(|c| c.abs().max_element()).fold(0.0, f32::max);
+        let scale = scale_for(largest(&self.coefficients), self.format);
+        let (mut bytes, mut clamped, mut underflowed) = (Vec::new(), 0, 0);
+        for number in self.coefficients.iter().flat_map(|c| c.to_array()) {
+            let scaled = number / scale;
+            clamped += u64::from(scaled.is_nan() || scaled.abs() > self.format.max());
+            let held = if scaled.is_nan() { 0.0 } else { scaled.clamp(-self.format.max(), self.format.max()) };
+            match self.format {
+                ColorFormat::F16 => {
+                    let code = f16::from_f32(held);
+                    underflowed += u64::from(held != 0.0 && code.to_f32() == 0.0);
+                    bytes.extend(code.to_le_bytes());
+                }
+                ColorFormat::F32 | ColorFormat::R11G11B10F => bytes.extend(held.to_le_bytes()),
+            }
+        }
+        container.put_bytes(TENSOR, self.format.dtype(), &[self.coefficients.len() / COUNT, COUNT, 3], bytes);
+        container.put_json(PRESAMPLED_KEY, &self.store().presampled);
+        container.put_json(SCALE_KEY, &scale);
+        losses.clamped.insert(TENSOR.to_owned(), clamped);
+        losses.underflowed.insert(TENSOR.to_owned(), underflowed);
+    }
+
+    /// Reads its tensor; inverse of [`Self::write`] up to rounding. What shading reads has the rounding of its own format.
+    ///
+    /// # Errors
+    /// What is missing or out of range.
+    pub fn read(container: &Container, probes: usize) -> Result<ShIrradiance, String> {
+        let tensor = container.tensor(TENSOR, &[Dtype::F16, Dtype::F32], &[Some(probes), Some(COUNT), Some(3)])?;
+        let scale: f32 = container.json(SCALE_KEY)?;
+        if !(scale > 0.0 && scale.is_finite()) {
+            return Err(format!("metadata '{SCALE_KEY}' is {scale}"));
+        }
+        let presampled: Option<usize> = container.json(PRESAMPLED_KEY)?;
+        // Largest of any map, texels per side: nothing larger can be asked for.
+        const MOST: usize = 1024;
+        if presampled.is_some_and(|n| !(1..=MOST).contains(&n)) {
+            return Err(format!("metadata '{PRESAMPLED_KEY}' is {presampled:?}"));
+        }
+        let format = ColorFormat::of(tensor.dtype).ok_or_else(|| format!("tensor '{TENSOR}' has no colour format"))?;
+        let coefficients: Vec<Vec3> = decode_colors(&tensor.bytes, format, scale);
+        if coefficients.iter().any(|c| !c.is_finite()) {
+            return Err(format!("tensor '{TENSOR}' holds numbers that are not finite"));
+        }
+        let mut read = ShIrradiance::zeros(&ShStore { format, presampled }, probes);
+        read.restore(&coefficients);
+        read.round();
+        Ok(read)
+    }
+
+    /// Gives the maps that shading reads the values of their format.
+    fn round(&mut self) {
+        let Some(maps) = &mut self.presampled else { return };
+        let texels: Vec<Vec3> = maps.texels.iter().map(|&t| t.into()).collect();
+        let encoded = encode_colors(&texels, PRESAMPLED);
+        let decoded = decode_colors(&encoded.bytes, PRESAMPLED, encoded.scale);
+        maps.texels = decoded.into_iter().map(Vec3A::from).collect();
+    }
+}
+
+#[inline]
+fn evaluate(coefficients: &[Vec3A], Functions(y): &Functions) -> Vec3A {
+    coefficients.iter().zip(y).map(|(c, y)| *c * *y).sum()
+}
+
+/// The functions at the centres of a map's texels, row by row.
+fn texel_functions(resolution: usize) -> Vec<Functions> {
+    let direction = |o: usize| texel_direction(o % resolution, o / resolution, resolution);
+    (0..resolution * resolution).map(|o| Functions(harmonics::basis(direction(o)))).collect()
+}
+
+fn sample(coefficients: &[Vec3A], functions: &[Functions], resolution: usize, map: &mut [Vec3A]) {
+    let interior: Vec<Vec3A> = functions.iter().map(|functions| evaluate(coefficients, functions)).collect();
+    fill_with_border(&interior, resolution, BORDER, map);
+}
+
+/// Names in the file.
+const TENSOR: &str = "sh";
+const PRESAMPLED_KEY: &str = "sh.presampled";
+const SCALE_KEY: &str = "scale.irradiance";
+
+/// Whether a file holds coefficients.
+pub fn is_in(container: &Container) -> bool {
+    container.has(TENSOR)
+}
+
+#[cfg(test)]
+mod tests;

@@ -58,20 +58,8 @@ fn map_and_cube(name: &str) -> [ProbeCapture; 2] {
     let position = low + (high - low) * Vec3::new(0.45, 0.6, 0.55);
     let fine = settings(octahedral(N, 64));
     let map = capture(&world, &fine, None).probe(0, position, |_| true);
-<<<<<<< HEAD
-    // A lobe of 1/√128 = 0.09 rad against the map's texels as in the preset.
-    let rays = Rays::Cube(CubeRays { face: 128, resolution: Some(n), sharpness: 128.0 });
-    let resampling = rays.resampling().unwrap();
-    let coarse = settings(rays.clone());
-||||||| 65ec702
-    // A lobe of 1/√128 = 0.09 rad against the map's texels as in the preset.
-    let rays = Rays::Cube(CubeRays { face: 128, resolution: n, sharpness: 128.0 });
-    let resampling = rays.resampling().unwrap();
-    let coarse = settings(rays.clone());
-=======
-    let rays = Rays::Cube(CubeRays { face: 128, resolution: N, sharpness: 128.0 });
+    let rays = Rays::Cube(CubeRays { face: 128, resolution: Some(N), sharpness: 128.0 });
     let (resampling, coarse) = (rays.resampling().unwrap(), settings(rays.clone()));
->>>>>>> 278cdb2954b556ecd57accc1c8a4faa422507d3e
     let cube = capture(&world, &coarse, Some(&resampling)).probe(0, position, |_| true);
     assert_eq!((cube.texels, cube.rays.primary), (N * N, rays.count() as u64));
     [map, cube]

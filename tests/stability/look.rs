@@ -27,13 +27,18 @@ pub struct Baked {
 
 /// Keys that are `null` where nobody asked for the figure, and the solver's that have no meaning where nothing bounces or
 /// the curve is not linear.
-const UNASKED: [&str; 10] = [
+const UNASKED: [&str; 15] = [
     "error_bound",
     "error_bound_relative",
+    "nrmse_mean",
+    "operator_norm",
+    "published",
     "raw_embree_rays_per_s",
     "saved_bytes",
     "saved_s",
     "spectral_radius_estimate",
+    "standard_error",
+    "stopped",
     "reference",
     "baked",
     "error",
@@ -41,15 +46,21 @@ const UNASKED: [&str; 10] = [
 ];
 
 /// Ratios to the light seen: `null` where there is none.
-const OF_LIGHT: [&str; 7] =
-    ["light", "dark", "fraction", "weight", "lookup_ns", "lookup_spread_ns", "irradiance_indirect_mean"];
+const OF_LIGHT: [&str; 8] =
+    ["light", "dark", "blocks", "fraction", "weight", "lookup_ns", "lookup_spread_ns", "irradiance_indirect_mean"];
+
+/// Figures of points in the air, and of the hull: `null` where a volume without extent, or behind surfaces that show their backs, holds
+/// no such point.
+const OF_POINTS: [&str; 5] = ["black", "leak_light", "leak_dark", "outside_hull", "unseen"];
 
 /// Everything that could go wrong in a report, whatever the scene.
 fn check_report(report: &Value, lit: bool) {
     fn walk(value: &Value, key: &str, lit: bool) {
         match value {
             Value::Null => {
-                let expected = UNASKED.contains(&key) || (!lit && (OF_LIGHT.contains(&key) || key == "rays_per_s"));
+                let expected = UNASKED.contains(&key)
+                    || OF_POINTS.contains(&key)
+                    || (!lit && (OF_LIGHT.contains(&key) || key == "rays_per_s"));
                 assert!(expected, "the report's {key} is null");
             }
             Value::Array(list) => list.iter().for_each(|v| walk(v, key, lit)),

@@ -17,6 +17,7 @@ pub mod lobe_albedo;
 pub mod path;
 pub mod places;
 pub mod punctual;
+mod roulette;
 pub mod sampled;
 pub mod surface;
 

@@ -16,6 +16,7 @@ use super::emitters::receiver::Receiver;
 use super::emitters::shares::Shares;
 use super::expected::{Expected, Light};
 use super::incident::{Incident, incident};
+use super::roulette::survival;
 use super::sampled::RayCount;
 use super::surface::SurfacePoint;
 use crate::math::blocks::BlockSample;
@@ -62,33 +63,6 @@ pub struct Gathered {
     /// The glossy part of `radiance`.
     pub glossy: Vec3,
 }
-
-/// Russian roulette starts at this bounce; where nothing is known of the light, at [`BLIND_ROULETTE_FROM`]. Earlier bounces
-/// carry most of the light, so ending paths there does not pay.
-const ROULETTE_FROM: u32 = 2;
-const BLIND_ROULETTE_FROM: u32 = 3;
-
-/// A path survives for certain if it is expected to bring this share of what its start receives.
-///
-/// Rays × variance of `reference` with these constants, against roulette by throughput alone (in brackets with
-/// [`most_survival`] 1 and 0.25 here; with its square root): office 0.62 (0.76, 0.66), rooms apart 0.72 (0.81, 0.89),
-/// veach_ajar 0.88 (0.81, 0.90), bathroom 0.89 (0.89, 0.91), two_rooms_open 0.90 (1.04, 0.93), courtyard 0.96 (1.05, 0.94).
-const CERTAIN: f32 = 0.15;
-
-/// What is expected everywhere besides what places know, as a share of what the start receives: they know it roughly.
-const UNEXPECTED: f32 = 0.2;
-
-/// Share of a place's direct light that counts as expected: rays towards emitters find most of it.
-const DIRECT_BY_PATH: f32 = 0.25;
-
-/// Largest probability with which a path of this throughput survives: its power of 3/8.
-fn most_survival(throughput: f32) -> f32 {
-    let root = throughput.sqrt().sqrt();
-    root * root.sqrt()
-}
-
-/// Least probability with which a path survives, unless its throughput is smaller still.
-const LEAST_SURVIVAL: f32 = 0.3;
 
 /// Number of pairs of dimensions of [`BlockSample`] that belong to a vertex. The constants below assign them.
 const PAIRS_PER_VERTEX: u32 = 8;
@@ -226,7 +200,7 @@ impl World<'_> {
             numbers.seek(bounce * PAIRS_PER_VERTEX + PAIR_SCATTER);
             let Some(next) = Step::sample(&point, &bsdf, numbers) else { return sum };
             throughput *= bsdf.scattered(next.direction, next.cosine).total() * next.density.recip();
-            let survival = vertex.survival(start, throughput, bounce);
+            let survival = survival(vertex.expected, start, throughput, bounce);
             if survival < 1.0 {
                 numbers.seek(bounce * PAIRS_PER_VERTEX + PAIR_ROULETTE);
                 let survives = numbers.uniform() < survival;
@@ -337,27 +311,6 @@ struct Vertex<'w> {
     shares: Option<(&'w Shares, f32)>,
     /// What its place is expected to receive, if that is known.
     expected: Option<Light>,
-}
-
-impl Vertex<'_> {
-    /// Probability with which a path of this throughput goes on from here (Russian roulette): by the light that it is
-    /// expected to bring, against the light that its start is expected to receive (Vorba & Křivánek, *Adjoint-driven
-    /// Russian roulette and splitting*, 2016). Where that is unknown, by throughput alone: throughputs stay similar then,
-    /// even if albedos are close to 1.
-    #[inline]
-    fn survival(&self, start: Option<Light>, throughput: Vec3, bounce: u32) -> f32 {
-        let most = throughput.max_element();
-        match (self.expected, start) {
-            _ if bounce < ROULETTE_FROM => 1.0,
-            (Some(here), Some(start)) if start.sum() > 0.0 => {
-                let brings =
-                    luminance(throughput) * ((here.indirect + DIRECT_BY_PATH * here.direct) / start.sum() + UNEXPECTED);
-                (brings / CERTAIN).min(most_survival(most)).max(most.min(LEAST_SURVIVAL)).min(1.0)
-            }
-            _ if bounce >= BLIND_ROULETTE_FROM => most.min(1.0),
-            _ => 1.0,
-        }
-    }
 }
 
 /// The next ray of a path.

@@ -1,5 +1,4 @@
-//! The light that places are expected to receive, roughly: what decides how long paths are worth following, and where
-//! probes look closely.
+//! The light that places are expected to receive, roughly: what decides how long paths are worth following.
 //!
 //! Every place knows the light that comes straight to it, and by a few rays which other places it sees
 //! ([`super::learnt`]). These rays are the links of a small radiosity system (Goral et al. 1984), solved by Jacobi
@@ -9,7 +8,7 @@ use rayon::prelude::*;
 
 use super::World;
 
-/// Links are followed this many times from the places that are asked for.
+/// Links are followed this many times from the places that are asked for. Not varied: a place farther off counts as unknown.
 const GENERATIONS: usize = 4;
 
 /// Bounces: at an albedo of 0.8 the rest is 1 %.

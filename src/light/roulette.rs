@@ -12,7 +12,7 @@ const BLIND_ROULETTE_FROM: u32 = 3;
 
 /// A path survives for certain if it is expected to bring this share of what its start receives.
 ///
-/// Rays × variance of `reference` with these constants, against roulette by throughput alone (in brackets with
+/// Rays × variance of `reference`, measured with a power of 0.35 for [`most_survival`], against roulette by throughput alone (in brackets with
 /// [`most_survival`] 1 and 0.25 here; with its square root): office 0.62 (0.76, 0.66), rooms apart 0.72 (0.81, 0.89),
 /// veach_ajar 0.88 (0.81, 0.90), bathroom 0.89 (0.89, 0.91), two_rooms_open 0.90 (1.04, 0.93), courtyard 0.96 (1.05, 0.94).
 const CERTAIN: f32 = 0.15;

@@ -11,6 +11,7 @@ use glam::{Vec3, Vec3A};
 use lightprobe::bake::{Baked, Circumstances, prepare};
 use lightprobe::config::Config;
 use lightprobe::light::World;
+use lightprobe::math::random::Purpose;
 use lightprobe::probe::capture::{Capture, ProbeCapture};
 use lightprobe::probe::file::SceneRecord;
 use lightprobe::probe::query::{Query, QueryPoint, Visibility};
@@ -103,6 +104,9 @@ fn filter_and_bounce(criterion: &mut Criterion) {
         keeps_geometric: false,
         sees: false,
         resampling: None,
+        guide: None,
+        counts: None,
+        purpose: Purpose::Capture,
         seed: 1,
     };
     let captures: Vec<ProbeCapture> =

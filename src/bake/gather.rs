@@ -101,7 +101,8 @@ pub fn gather<'p>(
             }
         },
     );
-    (log.rays.primary, log.rays.shadow) = rays;
+    log.rays.primary += rays.0;
+    log.rays.shadow += rays.1;
     log.numerics.hits_outside_volume += outside;
     log.numerics.non_finite += non_finite;
     log.numerics.light_clamped += light_clamped;

@@ -13,6 +13,7 @@ mod log;
 mod memory;
 #[cfg(test)]
 mod mixed_tests;
+mod pilot;
 mod pipeline;
 mod predict;
 mod prepared;

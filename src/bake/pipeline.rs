@@ -9,6 +9,7 @@ use super::log::Log;
 use super::prepared::Prepared;
 use crate::plan::{Line, Plan};
 use crate::probe::Volume;
+use crate::probe::capture::Capture;
 use crate::probe::container::{Container, FileError};
 use crate::probe::file::{self, Provenance, SceneRecord};
 use crate::probe::lattice::ProbeState;
@@ -46,7 +47,8 @@ impl Prepared<'_, '_> {
         log.numerics.albedo_clamped = self.world.clamped_materials();
         log.numerics.light_clamped += self.world.scene.light_clamped;
 
-        let capture = self.capture(circumstances);
+        let guide = self.pilot(circumstances, &mut log);
+        let capture = Capture { guide: guide.as_ref(), ..self.capture(circumstances) };
         let (captures, occlusion) = gather(&self, &capture, circumstances, &mut log);
         // What neither bounces nor shading ask for is only stored. Frames make it as they go, and so ask it.
         let asks = self.plan.visibility || !config.transport.captures_once();

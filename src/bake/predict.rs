@@ -63,7 +63,7 @@ impl Prepared<'_, '_> {
         // Large captures are alike, and few of them fit into memory.
         let fitting = (CHUNK_BYTES / surfels_bytes(config).max(1)) as usize;
         let quick = PILOT_RAYS / self.capture.rays.count().max(1);
-        let (pilot, share) = self.pilot(fitting.min(quick).clamp(1, PILOT));
+        let (pilot, share) = self.some_probes(fitting.min(quick).clamp(1, PILOT));
         let occlusion = self.occlusion_builder();
         let started = Instant::now();
         let trace = |&probe: &usize| {
@@ -135,7 +135,7 @@ impl Prepared<'_, '_> {
     fn kept_share(&self) -> f64 {
         /// Rays of each pilot: their share is known to some percent in all.
         const RAYS: usize = 256;
-        let (pilot, _) = self.pilot(PILOT);
+        let (pilot, _) = self.some_probes(PILOT);
         let kept = |&probe: &usize| -> f64 {
             let ray = |i| Ray::new(self.placement.positions[probe], fibonacci::direction(i, RAYS), i as u32);
             let bytes = |i| match self.world.surface(ray(i)) {
@@ -153,7 +153,7 @@ impl Prepared<'_, '_> {
     }
 
     /// At most `most` active probes, spread evenly, and how many each of them stands for.
-    fn pilot(&self, most: usize) -> (Vec<usize>, f64) {
+    fn some_probes(&self, most: usize) -> (Vec<usize>, f64) {
         let active = self.active();
         let pilot: Vec<usize> = active.iter().copied().step_by(active.len().div_ceil(most).max(1)).collect();
         let share = active.len() as f64 / pilot.len().max(1) as f64;

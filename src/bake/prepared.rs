@@ -9,6 +9,7 @@ use super::memory::Memory;
 use crate::config::{Config, VISIBILITY};
 use crate::light::World;
 use crate::light::contact::Contacts;
+use crate::math::random::Purpose;
 use crate::plan::Plan;
 use crate::probe::capture::{Capture, CaptureSettings, ProbeCapture, Resampling};
 use crate::probe::lattice::ProbeState;
@@ -60,7 +61,6 @@ pub fn prepare<'w, 's>(
         settings: &settings,
         occlusion: &config.store.occlusion,
         reach: config.query.reach(),
-        seed: circumstances.seed,
     };
     let placement =
         log.stage(|times| &mut times.survey, "placing", 1, |bar| place(world, &task, || bar.set_prefix("surveying")));
@@ -85,6 +85,9 @@ impl Prepared<'_, '_> {
             keeps_geometric: self.config.query.needs_geometric(),
             sees: self.config.store.light_field != LightFieldStore::None,
             resampling: self.resampling.as_ref(),
+            guide: None,
+            counts: None,
+            purpose: Purpose::Capture,
             seed: circumstances.seed,
         }
     }
@@ -124,7 +127,9 @@ impl Prepared<'_, '_> {
         let index = ProbeIndex(probe as u32);
         // A probe that stands for a larger cell must know distances as much farther.
         let farther = self.grid.width(index) as f32;
-        let capture = Capture { distance_clamp_m: capture.distance_clamp_m.map(|m| m * farther), ..*capture };
+        let distance_clamp_m = capture.distance_clamp_m.map(|m| m * farther);
+        let counts = capture.guide.and_then(|guide| guide.of(probe));
+        let capture = Capture { distance_clamp_m, counts, ..*capture };
         (capture, self.grid.stream(index) as usize)
     }
 

@@ -51,6 +51,8 @@ pub fn today(path: &str, value: &str) -> Option<Vec<(String, String)>> {
     let set = |pairs: &[(&str, String)]| Some(pairs.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect());
     let written = from_json(value).unwrap_or_else(|| value.to_owned());
     match (path, choice(&written)?) {
+        // One number of search points holds for all surfaces of a voxel.
+        ("placement.survey.group_search_points", _) => set(&[]),
         ("plan", (mode, "")) => set(&[("plan.mode", mode.to_owned())]),
         ("capture.reflected", ("through_probes", "")) => set(&[("transport", "bounces()".to_owned())]),
         ("capture.reflected", ("path_traced", settings)) => set(&[("transport", format!("paths{settings}"))]),

@@ -10,6 +10,8 @@ use rand_pcg::rand_core::Rng;
 pub enum Purpose {
     /// Jitter of capture rays inside their texel, and the light samples at what they hit.
     Capture = 1,
+    /// The same for the captures that guide others.
+    Pilot = 20,
     /// Light samples at probe centres.
     ProbeEmission = 2,
     /// Rays through a pixel, which translucent surfaces stop by chance.

@@ -1,12 +1,13 @@
 //! The G-buffer of a probe: what it sees, with the light that reaches what it sees.
 //!
-//! Rays are stratified over the texels of an octahedral map, jittered within each. Of every hit the capture keeps a
+//! Rays go through the texels of a map, at random within each. Of every hit the capture keeps a
 //! [`Surfel`] — enough to compute its outgoing radiance again and again as bounces are added — and of every texel the
 //! emitted radiance and the distance. Traced once; a bounce costs queries only.
 
 mod backs;
 mod captured;
 mod cube;
+pub mod guide;
 mod rays;
 pub mod surfel;
 #[cfg(test)]
@@ -20,6 +21,7 @@ use serde::{Deserialize, Serialize};
 pub use self::backs::{BackRadiance, Backs};
 pub use self::captured::{ProbeCapture, Seen};
 pub use self::cube::Resampling;
+use self::guide::Guide;
 pub use self::rays::{CubeRays, FibonacciRays, OctahedralRays, Rays};
 use self::rays::{Pattern, TexelRay};
 use self::surfel::{PackedNormal, Surfel};
@@ -71,7 +73,7 @@ impl Default for CaptureSettings {
         CaptureSettings {
             rays: Rays::default(),
             emission: EmissionTransport::Sampled,
-            emitter_samples: 4,
+            emitter_samples: 2,
             probe_emitter_samples: 64,
             backs: Backs::default(),
         }
@@ -108,6 +110,12 @@ pub struct Capture<'w, 's> {
     pub sees: bool,
     /// Of [`Rays::resampling`].
     pub resampling: Option<&'w Resampling>,
+    /// Where guided rays go; `None`: there are none.
+    pub guide: Option<&'w Guide>,
+    /// What it says of the probe that is captured.
+    pub counts: Option<&'w [u16]>,
+    /// What its random numbers are for.
+    pub purpose: Purpose,
     pub seed: u64,
 }
 
@@ -173,8 +181,12 @@ impl Capture<'_, '_> {
     }
 
     fn cast(&self, index: usize, position: Vec3, contains: impl Fn(Vec3) -> bool, turn: &Turn) -> ProbeCapture {
-        let layout = self.settings.rays.pattern();
-        let (texels, count) = (layout.texels(), self.settings.rays.count());
+        let layout = self.settings.rays.pattern(self.counts);
+        let texels = layout.texels();
+        let count = match self.counts {
+            Some(counts) => counts.iter().map(|&n| usize::from(n)).sum(),
+            None => self.settings.rays.unguided().count(),
+        };
         let (surface_samples, centre) = (self.surface_samples(), self.centre(index, position));
         let centre = centre.as_ref();
         let world = self.world;
@@ -185,7 +197,7 @@ impl Capture<'_, '_> {
             surfels: Vec::with_capacity(if self.hit_light == HitLight::None { 0 } else { count }),
             ..Default::default()
         };
-        let mut random = Random::new(self.seed, Purpose::Capture, index as u64, turn.stream);
+        let mut random = Random::new(self.seed, self.purpose, index as u64, turn.stream);
         // A row of texels at a time, in short loops whose turns do not wait for one another: hits are scattered over
         // memory, and one long loop would wait for each in its turn.
         let (mut rays, mut hits, mut lit) = (Vec::new(), Vec::new(), Vec::new());

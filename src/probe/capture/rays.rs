@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 use super::cube::{self, CUBE_FACES, Resampling};
 use crate::math::fibonacci;
 use crate::math::octahedral::{direction_and_density, oct_from_direction, solid_angle_density};
-use crate::math::random::Random;
+use crate::math::random::{KroneckerSequence, Random, unit_from_bits};
 use crate::probe::store::kernel::Directions;
 
 /// The rays of one probe.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Rays {
-    /// Stratified over the texels of an octahedral map, jittered within each.
+    /// Through the texels of an octahedral map, as many as each is worth.
     Octahedral(OctahedralRays),
     /// Spherical Fibonacci points: each ray is a texel of its own.
     Fibonacci(FibonacciRays),
@@ -61,13 +61,16 @@ impl Default for CubeRays {
 pub struct OctahedralRays {
     /// Texels per side of the G-buffer.
     pub resolution: usize,
-    /// Stratified rays per texel.
+    /// Rays per texel, evenly spread.
     pub per_texel: usize,
+    /// Further rays, as many a texel in the mean over all probes, that go where a first solution promises most for them, see
+    /// [`super::guide`].
+    pub guided: f32,
 }
 
 impl Default for OctahedralRays {
     fn default() -> Self {
-        OctahedralRays { resolution: 32, per_texel: 1 }
+        OctahedralRays { resolution: 24, per_texel: 1, guided: 2.0 }
     }
 }
 
@@ -87,16 +90,18 @@ impl Rays {
         }
     }
 
-    /// Rays of one probe.
+    /// Rays of one probe, in the mean where some are guided.
     pub fn count(&self) -> usize {
         match self {
-            Rays::Octahedral(rays) => self.texels() * rays.per_texel.max(1),
+            Rays::Octahedral(rays) => {
+                self.texels() * rays.per_texel.max(1) + (self.texels() as f32 * rays.guided) as usize
+            }
             Rays::Fibonacci(rays) => rays.count,
             Rays::Cube(rays) => CUBE_FACES * rays.face * rays.face,
         }
     }
 
-    /// Most surfaces that are kept of one probe.
+    /// Most surfaces that are kept of one probe, in the mean where some rays are guided.
     pub fn kept(&self) -> usize {
         if let Rays::Cube(_) = self { self.texels() } else { self.count() }
     }
@@ -122,11 +127,14 @@ impl Rays {
         }
     }
 
-    pub(super) fn pattern(&self) -> Pattern {
+    /// The rays of a probe; with `counts` so many through each texel of an octahedral map.
+    pub(super) fn pattern<'c>(&self, counts: Option<&'c [u16]>) -> Pattern<'c> {
         match self {
-            Rays::Octahedral(rays) => {
-                Pattern::Octahedral(Layout::octahedral(rays.per_texel.max(1), rays.resolution as u32))
-            }
+            Rays::Octahedral(rays) => Pattern::Octahedral(Layout {
+                resolution: rays.resolution as u32,
+                per_texel: rays.per_texel.max(1) as u32,
+                counts,
+            }),
             Rays::Fibonacci(rays) => Pattern::Fibonacci { count: rays.count },
             Rays::Cube(rays) => Pattern::Cube { face: rays.face as u32 },
         }
@@ -147,6 +155,24 @@ impl Rays {
             Resampling::bytes(*face, *resolution, *sharpness)
         } else {
             (0, 0)
+        }
+    }
+
+    /// Texels per side, even rays a texel and guided ones, where there are any.
+    pub fn guided(&self) -> Option<(usize, usize, f32)> {
+        match self {
+            Rays::Octahedral(OctahedralRays { resolution, per_texel, guided }) if *guided > 0.0 => {
+                Some((*resolution, (*per_texel).max(1), *guided))
+            }
+            _ => None,
+        }
+    }
+
+    /// The same without guided rays.
+    pub fn unguided(&self) -> Rays {
+        match self {
+            Rays::Octahedral(rays) => Rays::Octahedral(OctahedralRays { guided: 0.0, ..rays.clone() }),
+            Rays::Fibonacci(_) | Rays::Cube(_) => self.clone(),
         }
     }
 
@@ -194,10 +220,12 @@ impl Rays {
     pub fn check(&self, most_texels: usize, rule: &mut dyn FnMut(&'static str, String, bool, &'static str)) {
         let texels = "use 1 to 1024 texels";
         match self {
-            Rays::Octahedral(OctahedralRays { resolution: n, per_texel }) => {
+            Rays::Octahedral(OctahedralRays { resolution: n, per_texel, guided }) => {
                 rule(self.size_key(), n.to_string(), (1..=most_texels).contains(n), texels);
                 let holds = (1..=65_536).contains(per_texel);
                 rule("capture.rays.octahedral.per_texel", per_texel.to_string(), holds, "use 1 to 65536");
+                let holds = (0.0..=MOST_GUIDED).contains(guided);
+                rule("capture.rays.octahedral.guided", guided.to_string(), holds, "use 0 to 64");
             }
             Rays::Fibonacci(FibonacciRays { count }) => {
                 rule(self.size_key(), count.to_string(), (1..=MOST_FIBONACCI).contains(count), "use 1 to 1048576");
@@ -215,6 +243,8 @@ impl Rays {
     }
 }
 
+/// Most guided rays per texel in the mean.
+const MOST_GUIDED: f32 = 64.0;
 /// Most lone rays of a probe.
 const MOST_FIBONACCI: usize = 1 << 20;
 /// Beyond this exponent a lobe is narrower than the texels of the largest cube.
@@ -233,13 +263,13 @@ pub struct TexelRay {
 }
 
 /// The rays of one probe before they are traced, row by row.
-pub enum Pattern {
-    Octahedral(Layout),
+pub enum Pattern<'c> {
+    Octahedral(Layout<'c>),
     Fibonacci { count: usize },
     Cube { face: u32 },
 }
 
-impl Pattern {
+impl Pattern<'_> {
     /// Texels that hits fall into before any resampling.
     pub fn texels(&self) -> usize {
         match self {
@@ -284,53 +314,57 @@ impl Pattern {
 }
 
 /// How rays are laid out in the octahedral square.
-pub struct Layout {
+pub struct Layout<'c> {
     resolution: u32,
-    /// Corner of every stratum of a texel relative to the texel's, in the octahedral square.
-    corners: Vec<Vec2>,
-    /// Sides of one stratum in the octahedral square.
-    size: Vec2,
-    /// Rays per area of the octahedral square.
-    per_area: f32,
+    /// Rays through every texel, unless `counts` says how many.
+    per_texel: u32,
+    counts: Option<&'c [u16]>,
 }
 
-impl Layout {
-    /// Strata as square as the divisors of `samples` allow.
-    fn octahedral(samples: usize, resolution: u32) -> Layout {
-        let columns = (1..=samples).take_while(|c| c * c <= samples).filter(|c| samples.is_multiple_of(*c)).last();
-        let columns = columns.unwrap_or(1);
-        let size = 2.0 / (resolution as f32 * Vec2::new(columns as f32, (samples / columns) as f32));
-        let corner = |sample: usize| Vec2::new((sample % columns) as f32, (sample / columns) as f32) * size;
-        let per_area = (samples * (resolution * resolution) as usize) as f32 / 4.0;
-        Layout { resolution, corners: (0..samples).map(corner).collect(), size, per_area }
-    }
-
+impl Layout<'_> {
     /// Rows of texels that [`Self::rays`] gives.
     pub fn rows(&self) -> u32 {
         self.resolution
     }
 
-    /// Rays of a probe per solid angle in a direction, sr⁻¹.
-    pub fn density(&self, direction: Vec3) -> f32 {
-        self.per_area / solid_angle_density(oct_from_direction(direction))
+    /// Rays through a texel per area of the octahedral square.
+    fn per_area(&self, texel: u32) -> f32 {
+        (self.count(texel) * self.resolution * self.resolution) as f32 / 4.0
     }
 
-    /// Rays through a row of texels, one at random in every stratum, appended to `rays`.
+    fn count(&self, texel: u32) -> u32 {
+        self.counts.map_or(self.per_texel, |counts| u32::from(counts[texel as usize]))
+    }
+
+    /// Rays of a probe per solid angle in a direction, sr⁻¹.
+    pub fn density(&self, direction: Vec3) -> f32 {
+        let oct = oct_from_direction(direction);
+        let n = self.resolution;
+        let texel = ((oct + 1.0) * (0.5 * n as f32)).max(Vec2::ZERO).as_uvec2().min(UVec2::splat(n - 1));
+        self.per_area(texel.y * n + texel.x) / solid_angle_density(oct)
+    }
+
+    /// Rays through a row of texels, appended to `rays`: at random within each, several in an even sequence.
     pub fn rays(&self, row: u32, random: &mut Random, rays: &mut Vec<TexelRay>) {
         let texel_size = 2.0 / self.resolution as f32;
         for column in 0..self.resolution {
-            let corner_of_texel = UVec2::new(column, row).as_vec2() * texel_size - 1.0;
+            let corner = UVec2::new(column, row).as_vec2() * texel_size - 1.0;
+            let texel = row * self.resolution + column;
+            let per_area = self.per_area(texel);
+            let ray = |place: Vec2| {
+                let (direction, solid_angle) = direction_and_density(corner + place * texel_size);
+                TexelRay { texel, direction, density: per_area / solid_angle, share: 1.0 }
+            };
             let first = rays.len();
-            for stratum in &self.corners {
-                let jitter = Vec2::new(random.uniform(), random.uniform());
-                let (direction, solid_angle) = direction_and_density(corner_of_texel + stratum + jitter * self.size);
-                let (texel, density) = (row * self.resolution + column, self.per_area / solid_angle);
-                rays.push(TexelRay { texel, direction, density, share: 1.0 });
-            }
-            if let [_, _, ..] = rays[first..] {
-                // Solid angles are the inverse of densities.
-                let inverse_sum = 1.0 / rays[first..].iter().map(|r| 1.0 / r.density).sum::<f32>();
-                rays[first..].iter_mut().for_each(|r| r.share = inverse_sum / r.density);
+            match self.count(texel) {
+                1 => rays.push(ray(Vec2::new(random.uniform(), random.uniform()))),
+                count => {
+                    let places = KroneckerSequence::new(random).take(count as usize);
+                    rays.extend(places.map(|[x, y, ..]| ray(Vec2::new(unit_from_bits(x), unit_from_bits(y)))));
+                    // Solid angles are the inverse of densities.
+                    let inverse_sum = 1.0 / rays[first..].iter().map(|r| 1.0 / r.density).sum::<f32>();
+                    rays[first..].iter_mut().for_each(|r| r.share = inverse_sum / r.density);
+                }
             }
         }
     }

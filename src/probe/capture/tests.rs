@@ -32,12 +32,15 @@ fn capture<'a>(
         keeps_geometric: true,
         sees: true,
         resampling,
+        guide: None,
+        counts: None,
+        purpose: Purpose::Capture,
         seed: 1,
     }
 }
 
 fn octahedral(resolution: usize, per_texel: usize) -> Rays {
-    Rays::Octahedral(OctahedralRays { resolution, per_texel })
+    Rays::Octahedral(OctahedralRays { resolution, per_texel, guided: 0.0 })
 }
 
 /// What a capture's texels hold of light and of albedo.

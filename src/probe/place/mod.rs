@@ -5,6 +5,7 @@
 mod ddgi;
 pub mod need;
 pub mod overlap;
+mod piece;
 mod placement;
 mod sampled;
 mod settings;

@@ -47,9 +47,14 @@ pub fn seen_probes(
     seen
 }
 
-/// Moves probes that nothing sees to surfaces that see none. Returns how many were moved; the survey is out of date
-/// then.
-pub fn relocate(settler: &Settler, placement: &mut Placement, survey: &Survey) -> usize {
+/// Moves probes that nothing sees to surfaces that see none. Returns those that were moved: around them the survey is out of
+/// date.
+pub fn relocate(
+    settler: &Settler,
+    placement: &mut Placement,
+    survey: &Survey,
+    settings: &SurveySettings,
+) -> Vec<usize> {
     let (grid, table) = (settler.grid, &survey.table);
     // A probe under the floor may see the floor's back; no one else does.
     let seen = seen_probes(&settler.world.scene.mesh, grid, placement, table, |entry| survey.fronts[entry]);
@@ -59,7 +64,7 @@ pub fn relocate(settler: &Settler, placement: &mut Placement, survey: &Survey) -
         if !grid.corners(cell).iter().any(|probe| idle(probe.0 as usize)) {
             return Vec::new();
         }
-        let margin = survey.settings.voxel_margin;
+        let margin = settings.voxel_margin;
         let unseen = table.entries(cell).filter(|entry| entry.mask == 0);
         unseen.map(|entry| need(settler.world, grid, table, cell, &entry, margin)).collect()
     };
@@ -85,7 +90,7 @@ pub fn relocate(settler: &Settler, placement: &mut Placement, survey: &Survey) -
         placement.positions[probe] = position;
     }
     placement.relocated += moves.len();
-    moves.len()
+    moves.into_iter().map(|(probe, _)| probe).collect()
 }
 
 /// Where the surface of an entry can be seen from; `margin` is that of the survey's voxels.

@@ -29,7 +29,6 @@ pub struct PlacementTask<'a> {
     pub occlusion: &'a OcclusionStore,
     /// How far from a surface, in spacings, it may look probes up.
     pub reach: f32,
-    pub seed: u64,
 }
 
 impl Placement {

@@ -151,9 +151,6 @@ pub struct SurveySettings {
     /// lie inside the other wall, and the strip that does not must still be found. 8: `dark` +3e-4 in office, for 0.73 to 0.93 ×
     /// the rays; 128: none, for 1.1 to 1.7 ×.
     pub search_points: u32,
-    /// Most search points on all triangles of a voxel's side together, as far as each still gets `all_points`/2: finely
-    /// divided surfaces need no more points than a wall of two triangles does. 32 or 255: none.
-    pub group_search_points: u32,
     /// Voxels are taken larger by this share of their side on every side when surfaces are sorted into them, so that a
     /// surface on the border of two is known in both, on whichever side of it rounding puts the point that asks. 0: at most
     /// 2e-4, for 0.73 to 0.91 × the rays; 0.1: `dark` +0.005 in cornell.
@@ -165,14 +162,7 @@ pub struct SurveySettings {
 
 impl Default for SurveySettings {
     fn default() -> Self {
-        SurveySettings {
-            first_points: 2,
-            all_points: 8,
-            search_points: 32,
-            group_search_points: 128,
-            voxel_margin: 0.03,
-            far_rings: 3,
-        }
+        SurveySettings { first_points: 2, all_points: 8, search_points: 16, voxel_margin: 0.03, far_rings: 3 }
     }
 }
 
@@ -183,7 +173,6 @@ impl SurveySettings {
             ("placement.survey.first_points", self.first_points),
             ("placement.survey.all_points", self.all_points),
             ("placement.survey.search_points", self.search_points),
-            ("placement.survey.group_search_points", self.group_search_points),
         ] {
             // Votes are counted in 8 bits.
             rule(key, value.to_string(), (1..=255).contains(&value), "use 1 to 255");

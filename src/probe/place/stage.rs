@@ -4,7 +4,7 @@ use super::need;
 use super::placement::{Placement, PlacementTask};
 use super::settings::PlacementRule;
 use super::settle::{Settler, settle_all};
-use super::survey::Survey;
+use super::survey::Surveyor;
 use crate::light::World;
 use crate::probe::lattice::{Grid, ProbeState};
 use crate::probe::store::surface::SurfaceVisibility;
@@ -16,17 +16,17 @@ pub fn place(world: &World, task: &PlacementTask, surveying: impl FnOnce()) -> P
     let mut placement = settle_all(world, task);
     surveying();
     let Some(voxels) = occlusion.survey_voxels() else { return placement };
-    let survey = |placement: &mut Placement| {
-        let survey = Survey::run(world, grid, placement, voxels, &settings.survey, task.seed);
-        placement.rays += survey.rays;
-        survey
-    };
-    let mut found = survey(&mut placement);
+    let surveyor = Surveyor::new(world, grid, voxels, &settings.survey);
+    let mut found = surveyor.survey(&placement, None);
+    placement.rays += found.rays;
     if let PlacementRule::Settle(rule) = &settings.rule
         && rule.relocate
-        && need::relocate(&Settler { world, grid, settings: rule }, &mut placement, &found) > 0
     {
-        found = survey(&mut placement);
+        let moved = need::relocate(&Settler { world, grid, settings: rule }, &mut placement, &found, &settings.survey);
+        if !moved.is_empty() {
+            found = surveyor.survey(&placement, Some((&found, &moved)));
+            placement.rays += found.rays;
+        }
     }
     let mut table = found.table;
     // Only where shading asks this very table does it need a probe for every entry, and does a probe that no surface sees

@@ -1,15 +1,19 @@
 //! The survey that fills a [`SurfaceVisibility`]: rays from points of every surface to the eight probes of its cell.
+//!
+//! It depends on the scene, the grid and the probes alone, not on the seed: what a bake knows of visibility is as fixed as its
+//! grid, and two bakes that differ by chance do not differ in it.
 
 use glam::{UVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::overlap::triangle_meets_box;
+use super::piece::Piece;
 use super::placement::Placement;
 use super::settings::SurveySettings;
 use crate::light::World;
 use crate::light::contact::{Contacts, Facet, sight_line};
-use crate::math::random::{Purpose, Random};
-use crate::probe::lattice::grid::{CellIndex, Grid};
+use crate::math::random::{KroneckerSequence, Purpose, Random, unit_from_bits};
+use crate::probe::lattice::grid::{CellIndex, Grid, ProbeIndex};
 use crate::probe::store::surface::{Facing, SurfaceVisibility, active_corners, key, voxel_of_key};
 use crate::scene::{Mesh, TriangleIndex};
 use crate::trace::Ray;
@@ -44,289 +48,302 @@ pub struct Survey {
     /// Per entry: whether the front of a surface, or a surface that has no back, faces there.
     pub fronts: Vec<bool>,
     pub rays: u64,
-    pub settings: SurveySettings,
 }
 
 /// One side of a triangle in one voxel. Small, for there are millions and they are sorted.
 #[derive(Debug, Clone, Copy)]
 struct Side {
     cell: CellIndex,
+    triangle: u32,
     key: u16,
     /// Whether this is the back of the triangle.
     is_back: bool,
-    triangle: u32,
-    tally: Tally,
 }
 
-/// What the points of a [`Side`] see.
+/// What points of a voxel's surfaces see.
 #[derive(Debug, Clone, Copy, Default)]
 struct Tally {
-    /// Rays traced: at most eight for each point.
-    rays: u16,
+    /// At most eight for each point.
+    rays: u64,
     /// Points that see any probe at all. The others lie inside solids where walls meet, and have no vote.
-    points: u8,
+    points: u32,
     /// Of these, how many see each corner.
-    visible: [u8; 8],
-    /// Whether chance found no point of the triangle in the voxel, only its nearest one, which lies on an edge.
-    edge_only: bool,
-    /// Whether the outside of a surface faces here (as against the back of one that has only a front).
-    outside: bool,
+    visible: [u32; 8],
 }
 
 impl Tally {
-    /// Whether points well inside the voxel, on the outside of a surface, see any probe.
-    fn settles(&self) -> bool {
-        self.outside && !self.edge_only && self.points > 0
+    fn agrees(&self) -> bool {
+        self.visible.iter().all(|&v| v == 0 || v == self.points)
+    }
+
+    /// Corners that most points see.
+    fn majority(&self) -> u8 {
+        (0..8).fold(0, |mask, i| mask | u8::from(2 * self.visible[i] > self.points) << i)
     }
 }
 
-impl Survey {
-    /// Looks at every surface within the grid's hull, `voxels_per_cell` voxels along each axis of a cell.
-    pub fn run(
-        world: &World,
-        grid: &Grid,
-        placement: &Placement,
-        voxels_per_cell: u32,
-        settings: &SurveySettings,
-        seed: u64,
-    ) -> Survey {
-        let contacts = Contacts::of_points(world.scene, &placement.positions);
-        let surveyor = Surveyor { world, contacts: &contacts, grid, placement, n: voxels_per_cell, settings, seed };
-        let triangles = world.scene.mesh.triangles.len() as u32;
-        let mut sides: Vec<Side> = (0..triangles).into_par_iter().flat_map_iter(|t| surveyor.triangle(t)).collect();
-        // Sums of counts do not depend on the order, so neither does the result.
-        sides.par_sort_unstable_by_key(|e| (e.cell, e.key));
-        let mut rays: u64 = sides.iter().map(|e| u64::from(e.tally.rays)).sum();
-        let mut groups: Vec<&mut [Side]> = sides.chunk_by_mut(|a, b| (a.cell, a.key) == (b.cell, b.key)).collect();
-        rays += groups.par_iter_mut().map(|group| surveyor.search(group)).sum::<u64>();
-        let mut table = SurfaceVisibility { voxels_per_cell, ..Default::default() };
-        let mut fronts = Vec::new();
-        let mut groups = groups.into_iter().peekable();
-        for cell in grid.cells() {
-            table.cell_start.push(table.keys.len() as u32);
-            while let Some(group) = groups.next_if(|g| g[0].cell == cell) {
-                let mask = majority(group);
-                // The inside of a solid, or a voxel that an edge merely touches: nothing there asks.
-                if mask == 0 && !group.iter().any(|e| e.tally.outside && !e.tally.edge_only) {
-                    continue;
-                }
-                table.keys.push(group[0].key);
-                table.masks.push(mask);
-                fronts.push(group.iter().any(|e| e.tally.outside));
-            }
-        }
-        table.cell_start.push(table.keys.len() as u32);
-        Survey { table, fronts, rays, settings: settings.clone() }
-    }
+/// What is known of one side of a voxel.
+#[derive(Debug, Clone, Copy)]
+struct Found {
+    cell: CellIndex,
+    key: u16,
+    mask: u8,
+    is_front: bool,
+    /// Whether anything there asks: not the inside of a solid, nor a voxel that an edge merely touches.
+    asks: bool,
+    rays: u64,
 }
 
-/// Corners that most points see; points on edges vote only where there are no others.
-fn majority(group: &[Side]) -> u8 {
-    let only_edges = group.iter().all(|e| e.tally.edge_only || e.tally.points == 0);
-    let voters = || group.iter().map(|e| &e.tally).filter(|t| only_edges || !t.edge_only);
-    let points: u32 = voters().map(|t| u32::from(t.points)).sum();
-    (0..8).fold(0, |mask, i| {
-        let visible: u32 = voters().map(|t| u32::from(t.visible[i])).sum();
-        mask | u8::from(2 * visible > points) << i
-    })
-}
-
-struct Surveyor<'a, 's> {
+/// The surfaces in every voxel of a grid.
+pub struct Surveyor<'a, 's> {
     world: &'a World<'s>,
     grid: &'a Grid,
-    placement: &'a Placement,
-    contacts: &'a Contacts,
     n: u32,
-    settings: &'a SurveySettings,
-    seed: u64,
+    pub settings: &'a SurveySettings,
+    /// By cell, key and triangle.
+    sides: Vec<Side>,
 }
 
-impl Surveyor<'_, '_> {
-    fn mesh(&self) -> &Mesh {
+impl<'a, 's> Surveyor<'a, 's> {
+    /// Sorts every surface within the grid's hull into `voxels_per_cell` voxels along each axis of a cell.
+    pub fn new(world: &'a World<'s>, grid: &'a Grid, voxels_per_cell: u32, settings: &'a SurveySettings) -> Self {
+        let mut surveyor = Surveyor { world, grid, n: voxels_per_cell, settings, sides: Vec::new() };
+        // One triangle may be a whole floor: its cells are work for all threads.
+        let triangles = world.scene.mesh.triangles.len() as u32;
+        let met: Vec<(u32, CellIndex)> = (0..triangles)
+            .into_par_iter()
+            .flat_map_iter(|t| surveyor.cells_of(t).into_iter().map(move |cell| (t, cell)))
+            .collect();
+        surveyor.sides = met.par_iter().flat_map_iter(|&(t, cell)| surveyor.sides_in(t, cell)).collect();
+        surveyor.sides.par_sort_unstable_by_key(|e| (e.cell, e.key, e.triangle));
+        surveyor
+    }
+
+    fn mesh(&self) -> &'a Mesh {
         &self.world.scene.mesh
     }
 
-    /// Tallies of both sides of a triangle, in every voxel that it meets.
-    fn triangle(&self, triangle: u32) -> Vec<Side> {
-        let mut out = Vec::new();
-        let corners = self.mesh().corners(TriangleIndex(triangle));
-        let (low, high) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
-        // In cells.
-        let margin = self.settings.voxel_margin / self.n as f32;
-        let (beyond, _) = self.grid.is_beyond(low, high, margin);
-        if beyond {
-            return out;
-        }
-        for cell in self.grid.cells_near(low, high, margin) {
-            let local = corners.map(|c| self.grid.cell_from_scene(cell, c));
-            if triangle_meets_box(local.map(|c| c - 0.5), Vec3::splat(0.5 + margin)) {
-                self.cell(triangle, &local, cell, &mut out);
-            }
-        }
-        out
+    /// Voxels' margin in cells.
+    fn margin(&self) -> f32 {
+        self.settings.voxel_margin / self.n as f32
     }
 
-    /// One triangle in one cell; `local` are its corners in units of the cell.
-    fn cell(&self, triangle: u32, local: &[Vec3; 3], cell: CellIndex, out: &mut Vec<Side>) {
-        if active_corners(self.grid, &self.placement.states, cell) == 0 {
-            return;
+    /// Cells that a triangle meets.
+    fn cells_of(&self, triangle: u32) -> Vec<CellIndex> {
+        let corners = self.mesh().corners(TriangleIndex(triangle));
+        let (low, high) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
+        let margin = self.margin();
+        let (beyond, _) = self.grid.is_beyond(low, high, margin);
+        if beyond {
+            return Vec::new();
         }
-        let n = self.n as f32;
+        let mut cells: Vec<CellIndex> = self.grid.cells_near(low, high, margin).collect();
+        // The box of a small triangle is in one cell, and so is it.
+        if cells.len() > 1 {
+            cells.retain(|&cell| {
+                let local = corners.map(|c| self.grid.cell_from_scene(cell, c) - 0.5);
+                triangle_meets_box(local, Vec3::splat(0.5 + margin))
+            });
+        }
+        cells
+    }
+
+    /// Both sides of a triangle in every voxel of a cell that it meets.
+    fn sides_in(&self, triangle: u32, cell: CellIndex) -> Vec<Side> {
         let margin = self.settings.voxel_margin;
-        let scaled = local.map(|c| c * n);
+        let scaled = self.mesh().corners(TriangleIndex(triangle)).map(|c| self.in_voxels(cell, c));
         let low = scaled[0].min(scaled[1]).min(scaled[2]) - margin;
         let high = scaled[0].max(scaled[1]).max(scaled[2]) + margin;
         let last = UVec3::splat(self.n - 1);
         let (low, high) = (low.max(Vec3::ZERO).as_uvec3().min(last), high.max(Vec3::ZERO).as_uvec3().min(last));
         let front = Facing::of(self.mesh().geometric_normal(TriangleIndex(triangle)));
+        let mut out = Vec::new();
+        // Small triangles are wholly in one voxel.
+        let within = low == high;
         for z in low.z..=high.z {
             for y in low.y..=high.y {
                 for x in low.x..=high.x {
                     let voxel = UVec3::new(x, y, z);
                     let centre = voxel.as_vec3() + 0.5;
-                    let around = scaled.map(|c| c - centre);
-                    if !triangle_meets_box(around, Vec3::splat(0.5 + margin)) {
-                        continue;
-                    }
-                    for (is_back, facing) in [(false, front), (true, front.opposite())] {
-                        let key = key(voxel, facing, self.n);
-                        let mut side = Side { cell, key, is_back, triangle, tally: Tally::default() };
-                        side.tally = self.tally(&side, &around, self.settings.first_points);
-                        out.push(side);
+                    if within || triangle_meets_box(scaled.map(|c| c - centre), Vec3::splat(0.5 + margin)) {
+                        let side = |is_back, facing| Side { cell, triangle, key: key(voxel, facing, self.n), is_back };
+                        out.extend([side(false, front), side(true, front.opposite())]);
                     }
                 }
             }
         }
+        out
     }
 
-    /// Looks again, with more points, where nothing on the outside of the surfaces of a voxel has seen a probe yet.
-    /// Returns the number of rays.
-    fn search(&self, group: &mut [Side]) -> u64 {
-        if group.iter().any(|e| e.tally.settles()) {
-            return 0;
-        }
-        let mut rays = 0;
-        let cell = group[0].cell;
-        // In units of the cell.
-        let centre = (voxel_of_key(group[0].key, self.n).as_vec3() + 0.5) / self.n as f32;
-        let unseen = |e: &Side| e.tally.outside && !e.tally.edge_only && e.tally.rays > 0;
-        let count = group.iter().filter(|e| unseen(e)).count().max(1) as u32;
-        let SurveySettings { all_points, search_points, group_search_points, .. } = *self.settings;
-        let points = (group_search_points / count).max(all_points / 2).min(search_points);
-        for side in group.iter_mut().filter(|e| unseen(e)) {
-            let corners = self.mesh().corners(TriangleIndex(side.triangle));
-            let around = corners.map(|p| (self.grid.cell_from_scene(cell, p) - centre) * self.n as f32);
-            side.tally = self.tally(side, &around, points);
-            rays += u64::from(side.tally.rays);
-        }
-        rays
+    /// A position in units of a cell's voxels.
+    fn in_voxels(&self, cell: CellIndex, position: Vec3) -> Vec3 {
+        self.grid.cell_from_scene(cell, position) * self.n as f32
     }
 
-    /// Rays from points of a triangle within a voxel; `around` are its corners relative to the voxel's centre. Up to
-    /// `search` points are tried until one sees any probe.
-    fn tally(&self, side: &Side, around: &[Vec3; 3], search: u32) -> Tally {
-        let triangle = TriangleIndex(side.triangle);
-        let corners = &self.mesh().corners(triangle);
-        let front = self.mesh().geometric_normal(triangle);
-        let normal = if side.is_back { -front } else { front };
-        let active = active_corners(self.grid, &self.placement.states, side.cell);
-        let probes = self.grid.corners(side.cell);
-        let stream = u64::from(side.cell.0) << 16 | u64::from(side.key);
-        let mut random = Random::new(
-            self.seed,
-            Purpose::SurfaceVisibility,
-            stream,
-            2 * u64::from(side.triangle) + u64::from(side.is_back),
-        );
-        let outside = !side.is_back || self.world.scene.material(triangle).double_sided;
-        let SurveySettings { first_points, all_points, voxel_margin, .. } = *self.settings;
-        let mut tally = Tally { outside, ..Tally::default() };
-        for tried in 0.. {
-            let enough = match tally.points {
-                _ if tally.edge_only => 1,
-                0 => search,
-                points if tally.visible.iter().all(|&v| v == 0 || v == points) => first_points,
-                _ => all_points,
+    /// What surfaces see of these probes. Of the cells around none of the `moved` probes, what an earlier survey found.
+    pub fn survey(&self, placement: &Placement, earlier: Option<(&Survey, &[usize])>) -> Survey {
+        let contacts = Contacts::of_points(self.world.scene, &placement.positions);
+        let mut stale = vec![earlier.is_none(); self.grid.cell_count()];
+        for &probe in earlier.iter().flat_map(|(_, moved)| *moved) {
+            self.grid.cells_of(ProbeIndex(probe as u32)).for_each(|cell| stale[cell.0 as usize] = true);
+        }
+        let groups: Vec<&[Side]> = self
+            .sides
+            .chunk_by(|a, b| (a.cell, a.key) == (b.cell, b.key))
+            .filter(|group| stale[group[0].cell.0 as usize])
+            .collect();
+        let look = |group: &&[Side]| Look { surveyor: self, placement, contacts: &contacts, group }.look();
+        let found: Vec<Found> = groups.par_iter().map(look).collect();
+        let mut table = SurfaceVisibility { voxels_per_cell: self.n, ..Default::default() };
+        let mut fronts = Vec::new();
+        let mut anew = found.iter().filter(|found| found.asks).peekable();
+        for cell in self.grid.cells() {
+            table.cell_start.push(table.keys.len() as u32);
+            if let (Some((known, _)), false) = (earlier, stale[cell.0 as usize]) {
+                let range = known.table.range(cell);
+                table.keys.extend(&known.table.keys[range.clone()]);
+                table.masks.extend(&known.table.masks[range.clone()]);
+                fronts.extend(&known.fronts[range]);
+            }
+            while let Some(found) = anew.next_if(|found| found.cell == cell) {
+                table.keys.push(found.key);
+                table.masks.push(found.mask);
+                fronts.push(found.is_front);
+            }
+        }
+        table.cell_start.push(table.keys.len() as u32);
+        Survey { table, fronts, rays: found.iter().map(|found| found.rays).sum() }
+    }
+}
+
+/// A look from the surfaces of one side of a voxel.
+struct Look<'a, 's> {
+    surveyor: &'a Surveyor<'a, 's>,
+    placement: &'a Placement,
+    contacts: &'a Contacts,
+    group: &'a [Side],
+}
+
+impl Look<'_, '_> {
+    fn look(&self) -> Found {
+        let Surveyor { grid, world, n, settings, .. } = *self.surveyor;
+        let Side { cell, key, .. } = self.group[0];
+        // Backs of surfaces that have only fronts are asked for where nothing else is.
+        let is_outside = |side: &Side| !side.is_back || world.scene.material(TriangleIndex(side.triangle)).double_sided;
+        let is_front = self.group.iter().any(is_outside);
+        let mut found = Found { cell, key, mask: 0, is_front, asks: false, rays: 0 };
+        let active = active_corners(grid, &self.placement.states, cell);
+        if active == 0 {
+            return found;
+        }
+        let centre = voxel_of_key(key, n).as_vec3() + 0.5;
+        let piece = |side: &Side| {
+            let corners = self.surveyor.mesh().corners(TriangleIndex(side.triangle));
+            Piece::new(corners.map(|c| self.surveyor.in_voxels(cell, c) - centre), settings.voxel_margin)
+        };
+        let (mut outside, mut backs, mut touching) = (Vec::new(), Vec::new(), Vec::new());
+        for side in self.group {
+            let piece = piece(side);
+            let list = match piece.area > 0.0 {
+                false => &mut touching,
+                true if is_outside(side) => &mut outside,
+                true => &mut backs,
             };
-            if tried >= enough {
+            list.push((side, piece));
+        }
+        found.asks = !outside.is_empty();
+        for (tier, (pieces, search)) in
+            [(outside, settings.search_points), (backs, settings.first_points), (touching, settings.first_points)]
+                .iter()
+                .enumerate()
+        {
+            if pieces.is_empty() {
+                continue;
+            }
+            let tally = self.tally(pieces, active, *search, tier as u64);
+            found.rays += tally.rays;
+            if tally.points > 0 {
+                found.mask = tally.majority();
                 break;
             }
-            let (barycentric, inside) = point_in_voxel(around, voxel_margin, &mut random);
-            tally.edge_only |= !inside;
+        }
+        found.asks |= found.mask != 0;
+        found
+    }
+
+    /// Rays from points of these pieces, spread evenly over their area. Up to `search` points are tried until one sees any
+    /// probe.
+    fn tally(&self, pieces: &[(&Side, Piece)], active: u8, search: u32, tier: u64) -> Tally {
+        let Surveyor { grid, world, settings, .. } = *self.surveyor;
+        let Side { cell, key, .. } = self.group[0];
+        let probes = grid.corners(cell);
+        let area: f32 = pieces.iter().map(|(_, piece)| piece.area).sum();
+        let SurveySettings { first_points, all_points, .. } = *settings;
+        // Several surfaces may see differently.
+        let first = first_points.max((pieces.len() as u32).min(all_points / 2));
+        let mut random = Random::new(0, Purpose::SurfaceVisibility, u64::from(cell.0) << 16 | u64::from(key), tier);
+        let mut points = KroneckerSequence::new(&mut random);
+        let mut tally = Tally::default();
+        for tried in 0.. {
+            let enough = match tally.points {
+                0 => search,
+                _ if tally.agrees() => first,
+                _ => all_points,
+            };
+            let (true, Some([place, x, y, salt])) = (tried < enough, points.next()) else { break };
+            let (side, barycentric) =
+                point(pieces, area * unit_from_bits(place), Vec2::new(unit_from_bits(x), unit_from_bits(y)));
+            let triangle = TriangleIndex(side.triangle);
+            let corners = &self.surveyor.mesh().corners(triangle);
+            let front = self.surveyor.mesh().geometric_normal(triangle);
             let position =
                 corners[0] + (corners[1] - corners[0]) * barycentric.x + (corners[2] - corners[0]) * barycentric.y;
+            let normal = if side.is_back { -front } else { front };
             let facet = Facet { position, normal, offset: ray_offset(corners) };
-            let mut seen = 0u8;
-            for (corner, probe) in probes.iter().enumerate() {
-                if active >> corner & 1 == 0 {
+            // Where the first points see nothing, the others mostly lie inside a solid: one ray tells.
+            if tried >= first && tally.points == 0 {
+                tally.rays += 1;
+                if self.is_buried(&facet, salt) {
                     continue;
                 }
+            }
+            let mut seen = 0u8;
+            for (corner, probe) in probes.iter().enumerate().filter(|(corner, _)| active >> corner & 1 == 1) {
                 let probe = probe.0 as usize;
                 let line = sight_line(&facet, self.placement.positions[probe], self.contacts.of(probe));
                 let Some((origin, target)) = line else { continue };
                 tally.rays += 1;
                 // From the surface: most rays that are blocked are blocked near it, where walls and solids meet, and
                 // Embree looks there first.
-                seen |= u8::from(!self.world.tracer.occluded(Ray::segment(origin, target, random.bits()))) << corner;
+                let salt = salt.wrapping_add(corner as u32);
+                seen |= u8::from(!world.tracer.occluded(Ray::segment(origin, target, salt))) << corner;
             }
-            tally.points += u8::from(seen != 0);
-            (0..8).for_each(|corner| tally.visible[corner] += seen >> corner & 1);
+            tally.points += u32::from(seen != 0);
+            (0..8).for_each(|corner| tally.visible[corner] += u32::from(seen >> corner & 1));
         }
         tally
     }
 }
 
-/// Barycentric coordinates of a random point of a triangle inside the unit box around the origin, and whether there
-/// is one; where chance finds none (slivers, corners), of the triangle's point nearest the box's centre.
-fn point_in_voxel(around: &[Vec3; 3], margin: f32, random: &mut Random) -> (Vec2, bool) {
-    /// Tries before a triangle's share of a voxel counts as a sliver.
-    const TRIES: usize = 8;
-    let (e1, e2) = (around[1] - around[0], around[2] - around[0]);
-    let normal = e1.cross(e2);
-    let axis = normal.abs().max_position();
-    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-    let determinant = e1[u] * e2[v] - e1[v] * e2[u];
-    for _ in 0..TRIES {
-        let p = Vec2::new(random.uniform() - 0.5 - around[0][u], random.uniform() - 0.5 - around[0][v]);
-        let b = Vec2::new(p.x * e2[v] - p.y * e2[u], e1[u] * p.y - e1[v] * p.x) / determinant;
-        let along_axis = around[0][axis] + e1[axis] * b.x + e2[axis] * b.y;
-        if b.x >= 0.0 && b.y >= 0.0 && b.x + b.y <= 1.0 && along_axis.abs() <= 0.5 + margin {
-            return (b, true);
-        }
+impl Look<'_, '_> {
+    /// Whether a point lies inside a solid: what it faces is a back.
+    fn is_buried(&self, facet: &Facet, salt: u32) -> bool {
+        let origin = facet.position + facet.normal * facet.offset;
+        let met = self.surveyor.world.surface(Ray::new(origin, facet.normal, salt));
+        met.is_some_and(|surface| surface.is_back())
     }
-    (nearest_to_origin(around), false)
 }
 
-/// Barycentric coordinates of the point of a triangle nearest the origin (Ericson, *Real-Time Collision Detection*,
-/// 2005, section 5.1.5).
-fn nearest_to_origin(t: &[Vec3; 3]) -> Vec2 {
-    let (ab, ac, ap) = (t[1] - t[0], t[2] - t[0], -t[0]);
-    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
-    if d1 <= 0.0 && d2 <= 0.0 {
-        return Vec2::ZERO;
+/// The side at a place within the pieces' whole area, and barycentric coordinates of a point of it. Pieces without any area
+/// take turns.
+fn point<'p>(pieces: &[(&'p Side, Piece)], place: f32, u: Vec2) -> (&'p Side, Vec2) {
+    let mut left = place;
+    for (side, piece) in pieces {
+        if left < piece.area {
+            return (side, piece.point(left, u));
+        }
+        left -= piece.area;
     }
-    let bp = -t[1];
-    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
-    if d3 >= 0.0 && d4 <= d3 {
-        return Vec2::X;
-    }
-    let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        return Vec2::new(d1 / (d1 - d3), 0.0);
-    }
-    let cp = -t[2];
-    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
-    if d6 >= 0.0 && d5 <= d6 {
-        return Vec2::Y;
-    }
-    let vb = d5 * d2 - d1 * d6;
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        return Vec2::new(0.0, d2 / (d2 - d6));
-    }
-    let va = d3 * d6 - d5 * d4;
-    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
-        let w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-        return Vec2::new(1.0 - w, w);
-    }
-    Vec2::new(vb, vc) / (va + vb + vc)
+    let (side, piece) = &pieces[(u.x * pieces.len() as f32) as usize % pieces.len()];
+    (side, piece.point(u.y * piece.area, u))
 }

@@ -1,15 +1,18 @@
 //! Placement and survey in scenes whose walls are known.
 
+use std::collections::HashMap;
+
 use glam::Vec3;
 
 use super::need::far_probes;
 use super::settle::settle_all;
-use super::survey::Survey;
+use super::survey::Surveyor;
 use super::*;
 use crate::light::World;
 use crate::probe::lattice::grid::{GridSettings, ProbeIndex};
 use crate::probe::lattice::{Grid, ProbeState};
 use crate::probe::store::OcclusionStore;
+use crate::probe::store::surface::SurfaceVisibility;
 use crate::scene::{self, LoadOptions, Scene};
 use crate::trace::Ray;
 
@@ -28,7 +31,7 @@ fn settle(settings: SettleSettings) -> PlacementSettings {
 
 fn placed(world: &World, grid: &Grid, settings: &PlacementSettings) -> Placement {
     let occlusion = OcclusionStore::default();
-    place(world, &PlacementTask { grid, settings, occlusion: &occlusion, reach: 0.0, seed: 1 }, || {})
+    place(world, &PlacementTask { grid, settings, occlusion: &occlusion, reach: 0.0 }, || {})
 }
 
 /// Whether something lies between two points, from either end.
@@ -44,7 +47,7 @@ fn probes_settle_in_the_open_and_near_their_grid_points() {
     let rule = SettleSettings::default();
     let settings = settle(rule.clone());
     let occlusion = OcclusionStore::None;
-    let task = PlacementTask { grid: &grid, settings: &settings, occlusion: &occlusion, reach: 0.0, seed: 1 };
+    let task = PlacementTask { grid: &grid, settings: &settings, occlusion: &occlusion, reach: 0.0 };
     let placement = settle_all(&world, &task);
     let settler = Settler { world: &world, grid: &grid, settings: &rule };
     let mut moved = 0;
@@ -153,30 +156,55 @@ fn far_probes_are_seen_and_not_too_far() {
 }
 
 #[test]
-fn the_survey_agrees_with_rays_of_its_own() {
+fn few_points_find_what_many_do() {
     let scene = scene("cornell");
     let world = World::new(&scene, 1.0, 0.999).unwrap();
     let grid = grid(&scene, 0.5);
     let placement = placed(&world, &grid, &PlacementSettings::default());
-    let survey = |seed| Survey::run(&world, &grid, &placement, 8, &SurveySettings::default(), seed).table;
-    let (a, b) = (survey(1), survey(2));
+    let survey = |settings: SurveySettings| Surveyor::new(&world, &grid, 8, &settings).survey(&placement, None);
+    let few = survey(SurveySettings::default());
+    let many = survey(SurveySettings { first_points: 64, all_points: 255, search_points: 255, ..Default::default() });
+    let (a, b) = (&few.table, &many.table);
+    assert!(few.rays * 5 < many.rays, "{} {}", few.rays, many.rays);
     // Other points, the same surfaces: keys agree, and most masks.
-    let shared: Vec<(u8, u8)> = grid
-        .cells()
-        .flat_map(|cell| {
-            let of_b: Vec<_> = b.entries(cell).collect();
-            let pair = |e: crate::probe::store::surface::Entry| {
-                let other = of_b.iter().find(|o| (o.voxel, o.facing) == (e.voxel, e.facing))?;
-                Some((e.mask, other.mask))
-            };
-            a.entries(cell).filter_map(pair).collect::<Vec<_>>()
-        })
-        .collect();
+    let of = |table: &SurfaceVisibility| -> HashMap<_, u8> {
+        grid.cells().flat_map(|c| table.range(c).map(move |i| ((c, table.keys[i]), table.masks[i]))).collect()
+    };
+    let (a_by_key, b_by_key) = (of(a), of(b));
+    let shared: Vec<(u8, u8)> = a_by_key.iter().filter_map(|(key, &mask)| Some((mask, *b_by_key.get(key)?))).collect();
     assert!(shared.len() * 100 >= a.keys.len() * 97, "{} of {}", shared.len(), a.keys.len());
     let bits: u32 = shared.iter().map(|(a, b)| (a ^ b).count_ones()).sum();
     // Voxels that an edge of shadow crosses may go either way: 1 % of bits.
     assert!(f64::from(bits) < 0.01 * 8.0 * shared.len() as f64, "{bits} of {} bits", 8 * shared.len());
-    assert_eq!(survey(1), a);
+    assert!(&survey(SurveySettings::default()).table == a, "another time, another table");
+}
+
+/// Where some probes moved, the surfaces around them are looked at again; the others are as they were.
+#[test]
+fn a_survey_is_renewed_where_probes_moved() {
+    let scene = scene("two_rooms_open");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let grid = grid(&scene, 1.0);
+    let mut placement = placed(&world, &grid, &PlacementSettings::default());
+    let settings = SurveySettings::default();
+    let surveyor = Surveyor::new(&world, &grid, 8, &settings);
+    let before = surveyor.survey(&placement, None);
+    // Two in the middle of the lit room.
+    let middle = Vec3::new(-2.0, 1.5, 0.0) - scene.origin_world.as_vec3();
+    let mut nearest: Vec<usize> = (0..grid.probe_count()).collect();
+    nearest.sort_by(|&a, &b| {
+        let distance = |p: usize| placement.positions[p].distance(middle);
+        distance(a).total_cmp(&distance(b))
+    });
+    let moved = [nearest[0], nearest[1]];
+    // Behind the walls.
+    let outside = scene.mesh.bounds().unwrap().0 - Vec3::ONE;
+    moved.iter().for_each(|&probe| placement.positions[probe] = outside);
+    let (renewed, anew) = (surveyor.survey(&placement, Some((&before, &moved))), surveyor.survey(&placement, None));
+    assert!(renewed.table == anew.table, "the tables differ");
+    assert_eq!(renewed.fronts, anew.fronts);
+    assert!(renewed.table != before.table, "nothing changed");
+    assert!(renewed.rays * 4 < anew.rays, "{} {}", renewed.rays, anew.rays);
 }
 
 #[test]

@@ -171,7 +171,7 @@ impl SurfaceVisibility {
     }
 
     /// Where a cell's entries are.
-    fn range(&self, CellIndex(cell): CellIndex) -> std::ops::Range<usize> {
+    pub fn range(&self, CellIndex(cell): CellIndex) -> std::ops::Range<usize> {
         self.cell_start[cell as usize] as usize..self.cell_start[cell as usize + 1] as usize
     }
 

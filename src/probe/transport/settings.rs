@@ -126,6 +126,9 @@ impl Default for BounceSettings {
 /// Iterations that combining them takes at most, by and large: 4 to 8 in the scenes of the project, 12 for stiff ones.
 const ACCELERATED_ITERATIONS: u32 = 12;
 
+/// Bounces of a rough solution: at an albedo of a half what is missing is a sixteenth.
+const ROUGH_BOUNCES: u32 = 4;
+
 impl BounceSettings {
     /// Whether differences of iterates are worth keeping.
     pub fn may_accelerate(&self) -> bool {
@@ -275,6 +278,14 @@ impl Transport {
             }
             Transport::Paths { .. } => BounceSettings { max_bounces: Some(1), ..BounceSettings::default() },
             Transport::Frames(_) | Transport::Tracing(_) => never(),
+        }
+    }
+
+    /// Plain bounces by which a pilot learns roughly where light is; 0 where light is not brought by bounces.
+    pub fn rough_bounces(&self) -> u32 {
+        match self {
+            Transport::Bounces(settings) => settings.most().min(ROUGH_BOUNCES),
+            _ => 0,
         }
     }
 

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use crate::light::World;
 use crate::light::contact::Contacts;
+use crate::math::random::Purpose;
 use crate::probe::Volume;
 use crate::probe::capture::{Capture, CaptureSettings, HitLight};
 use crate::probe::lattice::ProbeState;
@@ -52,6 +53,9 @@ impl Truth {
                 keeps_geometric: false,
                 sees: false,
                 resampling: resampling.as_ref(),
+                guide: None,
+                counts: None,
+                purpose: Purpose::Capture,
                 seed: seed.wrapping_add((run + 1).wrapping_mul(SEED_STEP)),
             };
             let probe = |p: usize| -> Vec<Vec3A> {

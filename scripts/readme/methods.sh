@@ -20,8 +20,8 @@ each other and may run at the same time. The tables of what there is are printed
              configs/presets/README.md, and the pictures into scripts/readme/
 
 LIGHTPROBE names a binary to use instead of building one, SCENES and PARTS lists of these, SHARED the folder that holds
-scenes/veach_ajar and scenes/bathroom (../shared), THREADS the threads of each sweep, SIZE and SPP other pictures, SPACING
-other grids than the scenes' own (for a quick look only)."
+scenes/veach_ajar and scenes/bathroom (../shared), THREADS the threads of each sweep, SIZE and SPP other pictures,
+SPACING other grids than the scenes' own (for a quick look only)."
 
 tables=
 for argument in "$@"; do

@@ -1,15 +1,16 @@
 #!/usr/bin/env bash
-# Two rooms with 16 probes each, sealed and open, as Luo (2022) tested them: does light leak, what does visibility cost, are
-# outer faces lit?
+# Two rooms with 16 probes each, sealed and open, as Luo (2022) tested them: does light leak, what does visibility cost,
+# are outer faces lit?
 
 # shellcheck source=scripts/lib.sh
 source "$(dirname -- "${BASH_SOURCE[0]}")/../lib.sh"
 
 only_help "usage: scripts/readme/two_rooms.sh
 
-Sets up, builds, bakes both two-room scenes with 4 × 2 × 2 probes within the rooms by every preset, renders both rooms and the
-outside, and prints the published table's columns with ours beside them. Results lie in out/methods/rooms; what is there is
-not made again. LIGHTPROBE names a binary to use instead of building one, THREADS its threads, SIZE and SPP other pictures." "$@"
+Sets up, builds, bakes both two-room scenes with 4 × 2 × 2 probes within the rooms by every preset, renders both rooms
+and the outside, and prints the published table's columns with ours beside them. Results lie in out/methods/rooms; what
+is there is not made again. LIGHTPROBE names a binary to use instead of building one, THREADS its threads, SIZE and SPP
+other pictures." "$@"
 
 provide_lightprobe
 
@@ -40,8 +41,8 @@ for scene in two_rooms_sealed two_rooms_open; do
             reference=$work/$scene.default/$camera/reference.exr
             against=(--reference "$spp")
             [[ ! -f $reference ]] || against=(--reference-image "$reference")
-            "$lightprobe" render "scenes/$scene.glb" "$folder/probes" -o "$folder/$camera" "${words[@]}" --size "$size" \
-                "${against[@]}" --threads "$threads" >&2
+            "$lightprobe" render "scenes/$scene.glb" "$folder/probes" -o "$folder/$camera" "${words[@]}" \
+                --size "$size" "${against[@]}" --threads "$threads" >&2
         done
     done
 done

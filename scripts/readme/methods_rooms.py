@@ -23,7 +23,7 @@ def room(scene, preset, camera):
 
 def rooms_row(scene, preset):
     (_, lit), (_, dark), (_, outside) = (room(scene, preset, camera) for camera in ("lit", "dark", "outside"))
-    if not lit:
+    if not (lit and dark and outside):
         return None
     mean = lit["irradiance_indirect_mean"]
     baked = read_json(WORK / "rooms" / f"{scene}.{preset}" / "bake.json")

@@ -1,77 +1,69 @@
 #!/usr/bin/env bash
-# All methods on all scenes: the README's tables and its contact sheet.
+# The comparison of all methods: sweeps of every scene, and the tables, curves and contact sheet made of them.
 
 # shellcheck source=scripts/lib.sh
 source "$(dirname -- "${BASH_SOURCE[0]}")/../lib.sh"
 
-only_help "usage: scripts/readme/methods.sh
+usage="usage: scripts/readme/methods.sh [--tables]
 
-Sets up, builds, and sweeps all presets over the scenes of scenes/ and, where they are there, ../shared/scenes: on equal
-positions in out/methods/SCENE. Prints a table of Markdown a scene. Where sweeps were interrupted they go on.
-LIGHTPROBE names a binary to use instead of building one; SCENES a list of scenes, SIZE and SPP other pictures." "$@"
+Sets up, builds, and sweeps all presets over each scene, in these parts:
+
+  positions  the same bounds and spacing for all methods
+  bytes      as many probes as fit into the bytes that the default needs there; wants 'positions' first
+  curves     a ladder of spacings, for error against bake time and against shading time
+  mixed      the mixed grid against the uniform one at the same finest spacing
+
+Results lie in out/methods/SCENE/PART. A sweep that was interrupted goes on where it stopped; scenes do not depend on
+each other and may run at the same time. The tables of what there is are printed as Markdown.
+
+  --tables   runs nothing: puts the tables of what lies in out/methods between the markers of README.md and
+             configs/presets/README.md, and the pictures into scripts/readme/
+
+LIGHTPROBE names a binary to use instead of building one, SCENES and PARTS lists of these, SHARED the folder that holds
+scenes/veach_ajar and scenes/bathroom (../shared), THREADS the threads of each sweep, SIZE and SPP other pictures,
+SPACING other grids than the scenes' own (for a quick look only)."
+
+tables=
+for argument in "$@"; do
+    case $argument in
+        -h | --help) printf '%s\n' "$usage" && exit 0 ;;
+        --tables) tables=1 ;;
+        *) die "unknown argument '$argument'; see --help" ;;
+    esac
+done
+
+methods=scripts/readme/methods.py
+if [[ -n $tables ]]; then
+    exec python3 "$methods" publish
+fi
 
 provide_lightprobe
+export LIGHTPROBE=$lightprobe
 
 size=${SIZE:-192x108}
-spp=${SPP:-256}
-read -ra scenes <<<"${SCENES:-two_rooms_sealed two_rooms_open thin_wall cornell courtyard office veach_ajar bathroom}"
-work=out/methods
-mkdir -p "$work"
+spp=${SPP:-512}
+read -ra scenes <<<"${SCENES:-$(python3 "$methods" scenes)}"
+read -ra parts <<<"${PARTS:-positions bytes curves mixed}"
 
-# Where a scene is, and what it needs besides its configuration.
-arguments() { # SCENE
-    case $1 in
-        veach_ajar) echo ../shared/scenes/veach_ajar/veach_ajar.glb --set grid.spacing_m=0.7 ;;
-        bathroom) echo ../shared/scenes/bathroom/LAZIENKA.gltf --env 1,1,1 ;;
-        courtyard) echo scenes/courtyard.glb --config configs/scenes/courtyard.ron --env 0.6,0.8,1.2 ;;
-        *) echo "scenes/$1.glb" --config "configs/scenes/$1.ron" ;;
-    esac
+# One part of a scene; its runs lie beside the scene's other parts, which share some of them.
+sweep() { # SCENE PART
+    local folder=out/methods/$1/$2 reference=out/methods/$1/positions/reference.exr lines words
+    lines=$(python3 "$methods" prepare "$1" "$2")
+    [[ -n $lines ]] || return 0
+    mapfile -t words <<<"$lines"
+    [[ -e $folder/runs ]] || ln -s ../runs "$folder/runs"
+    [[ -f $folder/reference.exr || ! -f $reference ]] || cp -- "$reference" "$folder/reference.exr"
+    say "$1, $2"
+    "$lightprobe" sweep "${words[@]}" -o "$folder" --ladder "$folder/ladder.ron" --size "$size" --reference "$spp" \
+        --seeds 1 --threads "${THREADS:-0}" >&2
 }
 
 for scene in "${scenes[@]}"; do
-    read -ra words <<<"$(arguments "$scene")"
-    [[ -f ${words[0]} ]] || { say "${words[0]} is not there: $scene is left out" && continue; }
-    "$lightprobe" sweep "${words[@]}" -o "$work/$scene" --preset all --equal positions --size "$size" \
-        --reference "$spp" --seeds 1 >&2
-    printf '\n%s\n\n' "$scene"
-    python3 - "$work/$scene/sweep.json" <<'PYTHON'
-import json
-import sys
-
-report = json.load(open(sys.argv[1], encoding="utf-8"))
-
-
-def percent(value):
-    return "–" if value is None else f"{100 * value:.3g} %"
-
-
-def seconds(value):
-    return "–" if value is None else f"{value:.3g} s"
-
-
-columns = [
-    ("error", "error_relative", percent),
-    ("corners", "error_corner", percent),
-    ("elsewhere", "error_flat", percent),
-    ("in air", "air_error", percent),
-    ("leak light", "leak_light", percent),
-    ("leak dark", "leak_dark", percent),
-    ("blocks", "leak_blocks", percent),
-    ("dark region", "leak_dark_region", percent),
-    ("bake", "bake_s", seconds),
-    ("shade", "shade_ms", lambda value: "–" if value is None else f"{value:.3g} ms"),
-    ("bytes per probe", "bytes_per_probe", lambda value: "–" if value is None else f"{value:,.0f}"),
-]
-print("| method | " + " | ".join(name for name, _, _ in columns) + " |")
-print("|---|" + "---|" * len(columns))
-for configuration in report["configurations"]:
-    figures = configuration["figures"]
-
-    def typical(key):
-        figure = figures[key]
-        return figure["mean"] if figure["geometric_mean"] is None else figure["geometric_mean"]
-
-    cells = [form(typical(key)) for _, key, form in columns]
-    print(f"| `{configuration['label']}` | " + " | ".join(cells) + " |")
-PYTHON
+    file=$(python3 "$methods" file "$scene")
+    [[ -f $file ]] || { say "$file is not there: $scene is left out" && continue; }
+    mkdir -p "out/methods/$scene/runs"
+    for part in "${parts[@]}"; do
+        sweep "$scene" "$part"
+    done
 done
+python3 "$methods" show "${scenes[@]}"

@@ -128,6 +128,11 @@ impl LadderFile {
         self.ladders.iter().any(|entry| entry.preset.is_none() && entry.config.is_none())
     }
 
+    /// Presets that its ladders start from, each once.
+    pub fn presets(&self) -> BTreeSet<&str> {
+        self.ladders.iter().filter_map(|entry| entry.preset.as_deref()).collect()
+    }
+
     /// Files that it refers to.
     pub fn files(&self) -> Vec<PathBuf> {
         self.ladders.iter().filter_map(|entry| entry.config.as_ref()).map(|file| self.beside(file)).collect()

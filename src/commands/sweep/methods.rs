@@ -58,9 +58,11 @@ fn methods(args: &SweepArgs, file: Option<&LadderFile>) -> Result<Vec<Method>> {
 
 /// Whether to find out what limits the best of each ladder. Where presets stand side by side they are compared with each
 /// other, and maps of twice their resolution would take longer than all else.
-pub fn wants_floors(args: &SweepArgs) -> bool {
-    let several = args.preset.len() > 1 || args.preset.iter().any(|name| name == "all");
-    args.ladder.is_some() && !several
+pub fn wants_floors(args: &SweepArgs, file: Option<&LadderFile>) -> bool {
+    let Some(file) = file else { return false };
+    let mut presets = file.presets();
+    presets.extend(args.preset.iter().map(String::as_str));
+    presets.len() < 2 && !presets.contains("all")
 }
 
 /// Files that configurations come from.

@@ -90,10 +90,11 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
         // Times depend on the threads.
         identity: format!("{}spp = {}\nthreads = {}\n", reference.identity.to_text(), reference.spp, session.threads),
     };
-    let mut work = Work::new(&setting, &ladders, args, console);
+    let wants_floors = wants_floors(args, file.as_ref());
+    let mut work = Work::new(&setting, &ladders, args, wants_floors, console);
     let outcomes = work.run_all()?;
     let sets = summary::ladders(&ladders, &outcomes);
-    let floor = if wants_floors(args) { work.floors(&sets, &outcomes)? } else { Vec::new() };
+    let floor = if wants_floors { work.floors(&sets, &outcomes)? } else { Vec::new() };
     let shown = work.shown(&sets, &outcomes)?;
     work.bar.finish_and_clear();
 

@@ -1,6 +1,5 @@
 //! The bakes of a sweep, one after the other: each has all threads.
 
-use super::methods::wants_floors;
 use super::sheet::Shown;
 use super::summary::Outcome;
 use crate::cli::SweepArgs;
@@ -23,11 +22,17 @@ pub struct Work<'a, 's> {
 }
 
 impl<'a, 's> Work<'a, 's> {
-    pub fn new(setting: &'a Setting<'a, 's>, ladders: &'a [Ladder], args: &SweepArgs, console: &'a Console) -> Self {
+    pub fn new(
+        setting: &'a Setting<'a, 's>,
+        ladders: &'a [Ladder],
+        args: &SweepArgs,
+        wants_floors: bool,
+        console: &'a Console,
+    ) -> Self {
         let seeds: Vec<u64> = (0..u64::from(args.seeds)).map(|k| args.trace.seed.wrapping_add(k)).collect();
         let rungs = ladders.iter().flat_map(|ladder| &ladder.rungs);
         let runs = rungs.map(|rung| rung.configs().len()).sum::<usize>() * seeds.len();
-        let floors = if wants_floors(args) { floor::STEPS * ladders.len() } else { 0 };
+        let floors = if wants_floors { floor::STEPS * ladders.len() } else { 0 };
         let bar = console.progress.stage("sweep", runs + floors);
         Work { setting, ladders, seeds, console, bar, kept: 0 }
     }

@@ -1,0 +1,216 @@
+"""What the comparison of all methods sweeps: scenes, parts, and the ladder file of each."""
+import itertools
+import json
+import math
+import os
+import pathlib
+import struct
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+WORK = ROOT / "out" / "methods"
+SHARED = os.environ.get("SHARED", "../shared")
+
+PRESETS = ["default", "irradiance-2022", "lightfield-2022", "ddgi-2019", "threev8-uniform", "threev8-mixed"]
+# More than 8 KiB a probe: ladders end at the scene's own spacing, beyond which a bake takes hours of a core.
+LARGE = {"irradiance-2022", "lightfield-2022"}
+
+# Spacings, m: the scene's own first; those of its curves from coarse to fine.
+SCENES = {
+    "two_rooms_sealed": {"spacing": 1.0},
+    "two_rooms_open": {"spacing": 1.0},
+    "two_rooms_open.dark": {"file": "scenes/two_rooms_open.glb", "spacing": 1.0, "words": ["--camera", "dark"]},
+    "thin_wall": {"spacing": 0.75},
+    "cornell": {"spacing": 0.25, "curve": [1.0, 0.7, 0.5, 0.35, 0.25, 0.18]},
+    "courtyard": {"spacing": 2.0, "curve": [8.0, 5.6, 4.0, 2.8, 2.0, 1.4]},
+    "office": {"spacing": 1.0, "mixed": 0.35},
+    "veach_ajar": {"file": f"{SHARED}/scenes/veach_ajar/veach_ajar.glb", "spacing": 0.7},
+    "bathroom": {
+        "file": f"{SHARED}/scenes/bathroom/LAZIENKA.gltf",
+        "spacing": 0.35,
+        "words": ["--env", "1,1,1"],
+        "curve": [1.4, 1.0, 0.7, 0.5, 0.35, 0.25],
+        "mixed": 0.25,
+    },
+}
+
+# Where a method at its published resolution would need more than 60 GB or 20 minutes of a core: settings instead.
+# (scene, part, preset): settings. Rows made with them are called scaled.
+SCALED = {}
+
+# The grid of `mixed` has so many probes that all methods there see faces of 32² instead of 64².
+MIXED_FACES = "capture.rays.cube.face=32"
+
+
+def file_of(scene):
+    return SCENES[scene].get("file", f"scenes/{scene}.glb")
+
+
+def config_of(scene):
+    path = pathlib.Path(file_of(scene))
+    config = ROOT / "configs" / "scenes" / f"{path.stem}.ron"
+    return config if config.is_file() else None
+
+
+def spacing_of(scene):
+    return float(os.environ.get("SPACING") or SCENES[scene]["spacing"])
+
+
+def read_json(path):
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError:
+        return None
+
+
+def sweep_of(scene, part):
+    return read_json(WORK / scene / part / "sweep.json")
+
+
+def typical(configuration, key):
+    figure = configuration["figures"][key]
+    return figure["mean"] if figure["geometric_mean"] is None else figure["geometric_mean"]
+
+
+# Ladders
+
+
+def ladder(scene, part, name, preset, settings, axes=""):
+    scaled = SCALED.get((scene, part, preset), [])
+    quoted = ", ".join(json.dumps(text) for text in [*settings, *scaled])
+    config = config_of(scene)
+    config = f'config: "{os.path.relpath(config, WORK / scene / part)}", ' if config else ""
+    name += ", scaled" if scaled else ""
+    return f'        (name: "{name}", preset: "{preset}", {config}set: [{quoted}]{axes}),\n'
+
+
+def at_spacing(spacing):
+    return [f"grid.spacing_m={spacing}"]
+
+
+def positions(scene):
+    return [ladder(scene, "positions", preset, preset, at_spacing(spacing_of(scene))) for preset in PRESETS]
+
+
+def curves(scene):
+    entries = []
+    for preset in PRESETS:
+        own = spacing_of(scene)
+        values = [s for s in SCENES[scene].get("curve", []) if s >= own or preset not in LARGE]
+        if values:
+            axes = f', axes: [(key: "grid.spacing_m", values: {values})]'
+            entries.append(ladder(scene, "curves", preset, preset, [], axes))
+    return entries
+
+
+def mixed(scene):
+    if "mixed" not in SCENES[scene]:
+        return []
+    settings = [*at_spacing(os.environ.get("SPACING") or SCENES[scene]["mixed"]), MIXED_FACES]
+    entries = [ladder(scene, "mixed", "uniform, scaled", "threev8-uniform", settings)]
+    for levels in (2, 3):
+        refine = f"placement.refine=mixed(levels: {levels})"
+        entries.append(ladder(scene, "mixed", f"mixed, {levels} levels, scaled", "threev8-mixed", [*settings, refine]))
+    return entries
+
+
+def bytes_(scene):
+    """Grids on which every method has about the bytes that the default has at the scene's own spacing."""
+    report = sweep_of(scene, "positions")
+    if report is None:
+        sys.exit(f"{scene}: there is no out/methods/{scene}/positions/sweep.json; run the part 'positions' first")
+    rows = {row["label"].split(",")[0]: row for row in report["configurations"]}
+    budget = typical(rows["default"], "bytes")
+    entries = [ladder(scene, "bytes", "default", "default", at_spacing(spacing_of(scene)))]
+    for preset in PRESETS[1:]:
+        probes = budget / typical(rows[preset], "bytes_per_probe")
+        if preset == "threev8-mixed":
+            grid = at_spacing(fitted_spacing(scene, probes, rows[preset]["probes"]))
+        else:
+            grid = ["grid.spacing_m=None", f"grid.divisions={fitted_divisions(extent(scene), probes)}"]
+        entries.append(ladder(scene, "bytes", preset, preset, grid))
+    return entries
+
+
+def bake(scene, *words):
+    config = config_of(scene)
+    layers = ["--config", str(config)] if config else []
+    env = SCENES[scene].get("words", [])
+    env = env if env[:1] == ["--env"] else []
+    command = [os.environ["LIGHTPROBE"], "bake", file_of(scene), *layers, *env, "-q", *words]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    if result.returncode != 0:
+        sys.exit(f"{scene}: {result.stderr.strip()}")
+    return result.stdout
+
+
+def extent(scene):
+    """Sides of the scene's box, m, from the spacing of a grid of 2 × 2 × 2: a cell less a twentieth on either side."""
+    path = WORK / scene / "extent.probes"
+    few = ["grid.spacing_m=None", "grid.divisions=(2,2,2)", "capture.rays.cube.face=1"]
+    bake(scene, "--preset", "threev8-uniform", "-o", str(path), *(word for text in few for word in ("--set", text)))
+    data = path.read_bytes()
+    header = json.loads(data[8 : 8 + struct.unpack("<Q", data[:8])[0]])
+    return [0.9 * spacing for spacing in json.loads(header["__metadata__"]["grid"])["spacing"]]
+
+
+def fitted_divisions(sides, probes):
+    """Of the grids whose spacings differ least among the axes that of nearest this number of probes: within 3 % any."""
+    found = set()
+    for step in range(600):
+        spacing = 2 * max(sides) * 0.99**step
+        exact = [side / spacing + 1.1 for side in sides]
+        found.update(itertools.product(*([max(1, math.floor(n)), max(1, math.ceil(n))] for n in exact)))
+
+    def badness(divisions):
+        # As `grid.divisions` lays them out; a single layer has the side for its spacing.
+        spacings = [side / (n - 1.1) if n > 1 else side for side, n in zip(sides, divisions)]
+        off = abs(math.log(math.prod(divisions) / probes))
+        return max(off, 0.03), max(spacings) / min(spacings), divisions
+
+    return "({},{},{})".format(*min(found, key=badness))
+
+
+def fitted_spacing(scene, probes, known):
+    """The spacing of a mixed grid of about so many probes; `known` has it at the scene's own spacing."""
+    best = None
+    middle = math.log(spacing_of(scene)) + math.log(known / probes) / 3
+    low, high = middle - 1, middle + 1
+    for _ in range(10):
+        spacing = float(f"{math.exp((low + high) / 2):.4g}")
+        settings = [f"grid.spacing_m={spacing}", "capture.rays.cube.face=1"]
+        words = [word for text in settings for word in ("--set", text)]
+        count = json.loads(bake(scene, "--preset", "threev8-mixed", *words, "--dry-run", "--json"))["probes"]
+        off = abs(math.log(count / probes))
+        if best is None or off < best[0]:
+            best = off, spacing
+        if count > probes:
+            low = math.log(spacing)
+        else:
+            high = math.log(spacing)
+    return best[1]
+
+
+PARTS = {"positions": positions, "bytes": bytes_, "curves": curves, "mixed": mixed}
+
+
+def prepare(scene, part):
+    folder = WORK / scene / part
+    entries = PARTS[part](scene)
+    if not entries:
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "ladder.ron").write_text("(\n    ladders: [\n" + "".join(entries) + "    ],\n)\n", encoding="utf-8")
+    (WORK / scene / "machine.txt").write_text(machine(), encoding="utf-8")
+    words = [file_of(scene), *SCENES[scene].get("words", [])]
+    words += {"positions": ["--equal", "positions"], "curves": ["--equal", "bytes"]}.get(part, [])
+    print("\n".join(words))
+
+
+def machine():
+    try:
+        lines = pathlib.Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown processor")

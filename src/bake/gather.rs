@@ -11,6 +11,7 @@ use crate::probe::Volume;
 use crate::probe::capture::{Capture, ProbeCapture, frame_rotation};
 use crate::probe::store::Occlusion;
 use crate::probe::transport::operator::{Captures, Filters, Frame, Scenery};
+use crate::probe::transport::rows;
 
 /// Probes that are traced before the next are begun: bounds the memory of what is not kept, and of replay's logs.
 pub const CHUNK: usize = 256;
@@ -30,6 +31,10 @@ impl Captures for Budgeted<'_> {
             Some(capture) => visit(capture),
             None => visit(&self.prepared.trace(self.capture, probe)),
         }
+    }
+
+    fn keeps(&self, probe: usize) -> bool {
+        self.stored[probe].is_some()
     }
 
     fn frame(&self, probe: usize, frame: u32) -> Option<Frame> {
@@ -64,6 +69,7 @@ pub fn gather<'p>(
     let mut stored: Vec<Option<ProbeCapture>> = (0..probes).map(|_| None).collect();
     let mut occlusion = prepared.occlusion_builder();
     let once = config.transport.captures_once();
+    let has_rows = rows::are_kept(&config.transport, &config.store.irradiance);
     let active = if once || occlusion.has_rays() { prepared.active() } else { Vec::new() };
     let at_once = (CHUNK_BYTES / surfels_bytes(config).max(1)) as usize;
     let at_once = at_once.clamp(rayon::current_num_threads().min(CHUNK), CHUNK);
@@ -93,7 +99,7 @@ pub fn gather<'p>(
                     non_finite += capture.non_finite;
                     light_clamped += capture.light_clamped;
                     occlusion.set(probe, &filtered);
-                    bytes += capture.bytes();
+                    bytes += capture.bytes() + if has_rows { rows::most_bytes(&capture) } else { 0 };
                     if once && circumstances.memory_budget_bytes.is_none_or(|budget| bytes <= budget) {
                         stored[probe] = Some(capture);
                     }

@@ -9,6 +9,7 @@ use crate::probe::capture::{ProbeCapture, Seen};
 use crate::probe::place::survey;
 use crate::probe::store::radiance::LightFieldStore;
 use crate::probe::transport::anderson::History;
+use crate::probe::transport::rows;
 use crate::scene::{Mesh, Scene};
 use crate::system::memory::{TooLittleMemory, available_bytes};
 
@@ -120,9 +121,16 @@ pub fn check(config: &Config, scene: &Scene) -> Result<(), BakeError> {
 /// [`BakeError::Grid`].
 pub fn surely_fits(config: &Config, scene: &Scene) -> Result<bool, BakeError> {
     let grid = Grid::refined(&config.grid, config.placement.refine, scene)?;
-    let kept = if config.transport.captures_once() { surfels_bytes(config) } else { 0 };
+    let kept = if config.transport.captures_once() { kept_bytes(config) } else { 0 };
     let captures = (grid.probe_count() as u64).saturating_mul(kept);
     Ok(Memory::of(config, &grid, &scene.mesh).check(config, captures).is_ok())
+}
+
+/// Most that is kept of one probe's captured surfaces, with what is worked out of them.
+pub fn kept_bytes(config: &Config) -> u64 {
+    let has_rows = rows::are_kept(&config.transport, &config.store.irradiance);
+    let rows = if has_rows { config.capture.rays.kept() as u64 * size_of::<Surfel>() as u64 } else { 0 };
+    surfels_bytes(config) + rows
 }
 
 /// Most that one probe's captured surfaces can take.

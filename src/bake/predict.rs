@@ -7,12 +7,13 @@ use rayon::prelude::*;
 
 use super::circumstances::Circumstances;
 use super::gather::{Budgeted, CHUNK_BYTES};
-use super::memory::{EMITTED_BYTES, SURFEL_BYTES, surfels_bytes};
+use super::memory::{EMITTED_BYTES, SURFEL_BYTES, kept_bytes, surfels_bytes};
 use super::prepared::Prepared;
 use crate::math::fibonacci;
 use crate::probe::capture::ProbeCapture;
 use crate::probe::store::Occlusion;
 use crate::probe::transport::operator::Operator;
+use crate::probe::transport::rows;
 use crate::system::memory::{TooLittleMemory, peak_memory_bytes, resident_bytes};
 use crate::trace::Ray;
 
@@ -77,7 +78,9 @@ impl Prepared<'_, '_> {
         };
         let traced: Vec<ProbeCapture> = pilot.par_iter().map(trace).collect();
         let capture_s = started.elapsed().as_secs_f64() * share;
-        let bytes = traced.iter().map(ProbeCapture::bytes).sum::<u64>() as f64 * share;
+        let has_rows = rows::are_kept(&config.transport, &config.store.irradiance);
+        let kept = |c: &ProbeCapture| c.bytes() + if has_rows { rows::most_bytes(c) } else { 0 };
+        let bytes = traced.iter().map(kept).sum::<u64>() as f64 * share;
 
         // Light that is lost at every bounce: what is not reflected, and what leaves the scene.
         let seen: usize = traced.iter().map(|c| c.texels).sum();
@@ -101,14 +104,17 @@ impl Prepared<'_, '_> {
         if bytes > 0.0 && bytes > budget as f64 {
             retraced_s = capture_s * (1.0 - budget as f64 / bytes);
         }
-        let bounce_s = operator.time(&volume, &pilot) * share;
+        let bounces = config.transport.expected_iterations(ratio);
+        // Where rows fit, all passes together take about as long as asking the surfaces once.
+        let asked = if has_rows && rows::fit(&operator, &volume) { f64::from(bounces.max(1)) } else { 1.0 };
+        let bounce_s = operator.time(&volume, &pilot) * share / asked;
         // Frames are captured anew, and none is kept.
         let once = config.transport.captures_once();
         Prediction {
             survey_s: self.survey_s,
             capture_s: if once { capture_s } else { 0.0 },
             bounce_s: bounce_s + if once { retraced_s } else { capture_s },
-            bounces: config.transport.expected_iterations(ratio),
+            bounces,
             capture_bytes: if once { (bytes as u64).min(budget) } else { 0 },
             map_bytes: self.memory.standing(),
             resident_bytes,
@@ -122,7 +128,7 @@ impl Prepared<'_, '_> {
             return self.memory.check(self.config, 0);
         }
         let budget = circumstances.memory_budget_bytes.unwrap_or(u64::MAX);
-        let most = (self.active().len() as u64).saturating_mul(surfels_bytes(self.config));
+        let most = (self.active().len() as u64).saturating_mul(kept_bytes(self.config));
         let checked = self.memory.check(self.config, most.min(budget));
         if checked.is_ok() {
             return checked;

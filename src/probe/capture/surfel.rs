@@ -30,7 +30,7 @@ pub struct Surfel {
 const NORMAL_SCALE: f32 = i16::MAX as f32;
 
 /// The `oct` of a normal in units of 1/[`NORMAL_SCALE`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PackedNormal([i16; 2]);
 
 impl PackedNormal {
@@ -73,6 +73,12 @@ impl Surfel {
             albedo: [albedo.x as u16, albedo.y as u16, albedo.z as u16],
             facing: Facing::of(surface.geometric_normal),
         }
+    }
+
+    /// Shading normal.
+    #[inline]
+    pub fn normal(&self) -> PackedNormal {
+        self.normal
     }
 
     /// `oct` of the shading normal.

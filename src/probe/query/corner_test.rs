@@ -33,6 +33,12 @@ impl CornerTest for Mask {
     }
 }
 
+/// A power; the first, which is the number itself, waits for no library.
+#[inline]
+fn raised(visibility: f32, power: f32) -> f32 {
+    if power == 1.0 { visibility } else { visibility.powf(power) }
+}
+
 /// Chebyshev's bound from the moments of distance.
 pub struct MomentsTest<'v> {
     pub maps: &'v OctahedralMaps<Vec2>,
@@ -53,7 +59,7 @@ impl CornerTest for MomentsTest<'_> {
     fn factor(&self, probe: ProbeIndex, biased: Vec3) -> f32 {
         let probe = probe.0 as usize;
         let from_probe = biased - self.positions[probe];
-        chebyshev_shortened(self.maps, probe, from_probe, self.shorter).powf(self.power).max(self.floor)
+        raised(chebyshev_shortened(self.maps, probe, from_probe, self.shorter), self.power).max(self.floor)
     }
 }
 
@@ -97,6 +103,6 @@ impl CornerTest for TilesTest<'_> {
         let p = probe.0 as usize;
         let (sides, steepness) = (box_sides(self.grid, probe), self.grid.width(probe) as f32);
         let visibility = self.tiles.visibility(p, biased - self.positions[p], sides, steepness, self.shorter);
-        visibility.powf(self.power).max(self.floor)
+        raised(visibility, self.power).max(self.floor)
     }
 }

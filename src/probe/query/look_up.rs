@@ -139,15 +139,8 @@ impl<'v> Query<'v> {
     /// Weighted mean of the probes' irradiance around the direction `oct`, the point's normal.
     #[inline]
     pub fn blend(&self, corners: &CornerWeights, point: &QueryPoint, oct: Vec2) -> Vec3 {
-        let total = corners.total();
-        if total <= 0.0 {
-            return Vec3::ZERO;
-        }
-        // Crushed weights may be so small that the reciprocal of their sum overflows; their shares are the same.
-        let lift = if total < f32::MIN_POSITIVE { 1.0 / f32::MIN_POSITIVE } else { 1.0 };
-        let per_total = 1.0 / (total * lift);
-        let counted = corners.probes.iter().zip(corners.weights).filter(|(_, weight)| *weight > 0.0);
-        let shares = counted.map(|(probe, weight)| (probe.0 as usize, weight * lift * per_total));
+        let Some(shares) = corners.shares() else { return Vec3::ZERO };
+        let shares = shares.map(|(corner, share)| (corners.probes[corner].0 as usize, share));
         let forward = |e| self.settings.blend.forward(e);
         let sum = match self.settings.look_up {
             LookUp::Normal => self.volume.irradiance.sum(oct, shares, forward),

@@ -31,6 +31,14 @@ pub enum Visibility {
     Exact(u8),
 }
 
+impl Visibility {
+    /// What is known of a point that sees these corners; of 0 nothing is known.
+    #[inline]
+    pub fn of_mask(mask: u8) -> Visibility {
+        if mask == 0 { Visibility::Stored } else { Visibility::Exact(mask) }
+    }
+}
+
 /// The eight probes of a point, in the order of [`Grid::corners_around`](crate::probe::Grid::corners_around), with their weights, not normalised.
 #[derive(Debug, Clone, Copy)]
 pub struct CornerWeights {
@@ -42,5 +50,19 @@ impl CornerWeights {
     #[inline]
     pub fn total(&self) -> f32 {
         self.weights.iter().sum()
+    }
+
+    /// The corners whose probes count, each with its share of all weights; `None` where there are none.
+    #[inline]
+    pub fn shares(&self) -> Option<impl Iterator<Item = (usize, f32)>> {
+        let total = self.total();
+        if total <= 0.0 {
+            return None;
+        }
+        // Crushed weights may be so small that the reciprocal of their sum overflows; their shares are the same.
+        let lift = if total < f32::MIN_POSITIVE { 1.0 / f32::MIN_POSITIVE } else { 1.0 };
+        let per_total = 1.0 / (total * lift);
+        let counted = self.weights.into_iter().enumerate().filter(|(_, weight)| *weight > 0.0);
+        Some(counted.map(move |(corner, weight)| (corner, weight * lift * per_total)))
     }
 }

@@ -163,6 +163,11 @@ impl QuerySettings {
         self.view_bias != 0.0
     }
 
+    /// Whether all probes that a point asks are read around one direction, its shading normal.
+    pub fn asks_one_direction(&self) -> bool {
+        self.look_up == LookUp::Normal
+    }
+
     /// Whether a look-up is a linear function of the probes' irradiance.
     pub fn is_linear(&self) -> bool {
         self.blend == Blend::Linear

@@ -137,6 +137,11 @@ impl Irradiance {
         }
     }
 
+    /// The coefficients, where it is held as such.
+    pub fn harmonics(&self) -> Option<&ShIrradiance> {
+        if let Irradiance::Sh9(sh) = self { Some(sh) } else { None }
+    }
+
     /// Directions in which irradiance is compared, each with its weight, sr per area of the octahedral square: the normals
     /// of the unknowns where these are irradiance.
     pub fn axes(&self) -> Vec<(Vec3, f32)> {

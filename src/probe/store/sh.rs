@@ -130,6 +130,22 @@ impl ShIrradiance {
         }
     }
 
+    /// What a look-up takes of the unknowns, by its direction.
+    pub fn shares(&self) -> Shares {
+        let maps = |maps: &OctahedralMaps<Vec3A>| {
+            let mut table = OctahedralMaps::new(1, maps.resolution, BORDER, Functions([0.0; COUNT]));
+            fill_with_border(&texel_functions(maps.resolution), maps.resolution, BORDER, table.probe_mut(0));
+            table
+        };
+        Shares { presampled: self.presampled.as_ref().map(maps) }
+    }
+
+    /// One of a probe's unknowns, W·m⁻².
+    #[inline]
+    pub fn unknown(&self, probe: usize, j: usize) -> Vec3A {
+        self.coefficients[probe * COUNT + j] * Y0
+    }
+
     /// The unknowns of one probe, W·m⁻².
     pub fn probe(&self, probe: usize) -> impl Iterator<Item = Vec3A> + '_ {
         self.of_probe(probe).iter().map(|c| *c * Y0)
@@ -279,6 +295,28 @@ impl ShIrradiance {
         let encoded = encode_colors(&texels, PRESAMPLED);
         let decoded = decode_colors(&encoded.bytes, PRESAMPLED, encoded.scale);
         maps.texels = decoded.into_iter().map(Vec3A::from).collect();
+    }
+}
+
+/// What look-ups take of the unknowns.
+pub struct Shares {
+    /// The functions where shading reads a map of them.
+    presampled: Option<OctahedralMaps<Functions>>,
+}
+
+impl Shares {
+    /// Of each unknown what a look-up around `oct` takes.
+    pub fn around(&self, oct: Vec2) -> [f32; COUNT] {
+        let mut shares = match &self.presampled {
+            Some(maps) => {
+                let taps = maps.taps(oct);
+                let texel = |i: usize| maps.texels[taps.offset[i] as usize].0;
+                std::array::from_fn(|j| (0..4).map(|i| texel(i)[j] * taps.weight[i]).sum())
+            }
+            None => harmonics::basis(direction_from_oct(oct)),
+        };
+        shares.iter_mut().for_each(|share| *share /= Y0);
+        shares
     }
 }
 

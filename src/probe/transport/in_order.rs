@@ -1,12 +1,13 @@
 //! Probes one after another: each is filled from all the others as they are then, and stands for the next ones at once
 //! (Gauss and Seidel's iteration), until no probe changes much any more.
 //!
-//! The order is that of the probes' numbers, so the result is the same for any number of threads: they share the surfaces
-//! that one probe sees.
+//! The order is that of the probes' numbers, so the result is the same for any number of threads: they share the probes
+//! whose [`rows`](super::rows) are worked out, and else the surfaces that one probe sees.
 
 use glam::Vec3;
 
 use super::operator::{Captures, Operator};
+use super::rows::Rows;
 use super::settings::InOrderSettings;
 use super::solver::{Bounce, Progress, Solution};
 use crate::math::color::luminance;
@@ -49,7 +50,11 @@ pub fn solve<C: Captures>(
     mut on_iteration: impl FnMut(&Progress, &Volume),
 ) -> Solution {
     let masks = operator.masks(volume);
+    let rows = Rows::new(operator, volume, &masks);
     let done = progress.solution.bounces.len() as u32;
+    if done == 0 {
+        progress.solution.non_finite += rows.non_finite();
+    }
     for index in done + 1..=settings.most {
         if progress.solution.converged {
             break;
@@ -59,7 +64,7 @@ pub fn solve<C: Captures>(
         let mut pass = Pass::default();
         for p in active {
             let before: Vec<Vec3> = volume.irradiance.probe(p).collect();
-            let (after, non_finite) = operator.update(volume, p, &masks);
+            let (after, non_finite) = rows.update(operator, volume, p, &masks);
             pass.non_finite += non_finite;
             let (mut change, mut size) = (Vec3::ZERO, Vec3::ZERO);
             for (o, (before, after)) in before.into_iter().zip(&after).enumerate() {

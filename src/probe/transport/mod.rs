@@ -5,6 +5,7 @@ pub mod checkpoint;
 mod frames;
 mod in_order;
 pub mod operator;
+pub mod rows;
 mod settings;
 pub mod solver;
 #[cfg(test)]

@@ -26,6 +26,11 @@ pub trait Captures: Sync {
     /// Calls `visit` on one probe's capture.
     fn with<R>(&self, probe: usize, visit: impl FnOnce(&ProbeCapture) -> R) -> R;
 
+    /// Whether a probe's capture is in memory.
+    fn keeps(&self, _probe: usize) -> bool {
+        true
+    }
+
     /// A probe's capture in one of many frames, each with rays of its own. `None` where captures do not change.
     fn frame(&self, _probe: usize, _frame: u32) -> Option<Frame> {
         None
@@ -82,6 +87,13 @@ pub struct Operator<'a, C> {
 /// For every surfel of every probe the corners of its cell that it sees, so that they need not be looked up again;
 /// 0 where they must be.
 pub struct Masks(Vec<Vec<u8>>);
+
+impl Masks {
+    /// Of the surfels of one probe.
+    pub fn of(&self, probe: usize) -> &[u8] {
+        &self.0[probe]
+    }
+}
 
 impl<C: Captures> Operator<'_, C> {
     /// Whether the operator is linear (affine): sums and differences of fields may be put into it.
@@ -197,18 +209,15 @@ impl<C: Captures> Operator<'_, C> {
     #[inline]
     fn leaves(&self, query: &Query, capture: &ProbeCapture, i: usize, position: Vec3, mask: Option<u8>) -> Vec3 {
         let surfel = &capture.surfels[i];
-        let visibility = match mask {
-            None => return surfel.direct_radiance,
-            Some(0) => Visibility::Stored,
-            Some(mask) => Visibility::Exact(mask),
-        };
+        let Some(mask) = mask else { return surfel.direct_radiance };
+        let visibility = Visibility::of_mask(mask);
         let point = self.query_point(capture, i, position);
         let weights = query.weights(&point, visibility);
         surfel.direct_radiance + reflected_radiance(surfel.albedo(), query.blend(&weights, &point, surfel.oct()))
     }
 
     /// A probe's unknowns from the radiance in its texels.
-    fn filtered(&self, radiance: &[Vec3A]) -> Vec<Vec3A> {
+    pub(super) fn filtered(&self, radiance: &[Vec3A]) -> Vec<Vec3A> {
         let mut irradiance = vec![Vec3A::ZERO; self.kernel.rows()];
         self.kernel.irradiance(radiance, &mut irradiance);
         irradiance

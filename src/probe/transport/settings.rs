@@ -195,6 +195,11 @@ impl Transport {
         matches!(self, Transport::Frames(_))
     }
 
+    /// Whether what surfaces ask of probes is worked out once for all iterations, where it can be.
+    pub fn keeps_rows(&self) -> bool {
+        matches!(self, Transport::InOrder(_))
+    }
+
     /// Whether it reads the light of surfaces in the probes' light fields.
     pub fn needs_light_field(&self) -> bool {
         matches!(self, Transport::Tracing(_))

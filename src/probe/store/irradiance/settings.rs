@@ -112,6 +112,11 @@ impl IrradianceStore {
         }
     }
 
+    /// Whether unknowns are coefficients of spherical harmonics.
+    pub fn is_harmonic(&self) -> bool {
+        matches!(self, IrradianceStore::Sh9(_))
+    }
+
     /// Memory of the filter from captures of this many texels.
     pub fn filter_bytes(&self, captured_texels: usize) -> u64 {
         match self {

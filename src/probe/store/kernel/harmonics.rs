@@ -1,5 +1,7 @@
 //! The filter from captured radiance to nine coefficients of irradiance.
 
+use std::f32::consts::PI;
+
 use super::{Directions, Kernel};
 use crate::math::harmonics::{self, COSINE, COUNT, Y0};
 
@@ -32,6 +34,23 @@ impl Kernel {
             kernel.row_start.push(kernel.entries.len());
         }
         kernel
+    }
+
+    /// Of every captured texel what radiance 1 in it adds to the coefficients, in their order, W·m⁻²; empty where these are
+    /// not harmonics.
+    pub fn harmonic_columns(&self) -> Vec<[f32; COUNT]> {
+        if self.dense.is_some() || self.rows() != COUNT {
+            return Vec::new();
+        }
+        let mut columns = vec![[0.0; COUNT]; self.row(0).len()];
+        for j in 0..COUNT {
+            for &(t, weight) in self.row(j) {
+                if let Some(column) = columns.get_mut(t as usize) {
+                    column[j] = PI * weight;
+                }
+            }
+        }
+        columns
     }
 }
 

@@ -51,7 +51,7 @@ impl Prepared<'_, '_> {
         log.times.capture += own.times.capture;
         log.rays.primary += own.rays.primary;
         log.rays.shadow += own.rays.shadow;
-        Some(Guide::new(pilots, per_texel, guided, circumstances.seed))
+        Some(Guide::new(pilots, &self.placement.asked, per_texel, guided, circumstances.seed))
     }
 
     /// What every active probe's texels hold, with what numbers the probe's random sequences.

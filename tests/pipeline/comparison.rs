@@ -208,7 +208,10 @@ fn a_traced_reference_is_as_good_as_its_file() {
     assert!(read["baked"].is_null());
     let baked = &traced["baked"];
     let balance = number(&baked["light"]) - number(&baked["dark"]) - number(&baked["bias"]);
-    assert!(balance.abs() < 1e-6 && number(&baked["standard_error"]["bias"]) > 0.0, "{baked}");
+    let errors = &baked["standard_error"];
+    // What noise alone makes is taken off either, but neither falls below 0.
+    let clipped = if number(&baked["light"]) > 0.0 { 0.0 } else { 3.0 * number(&errors["dark"]) };
+    assert!(balance.abs() < 1e-6 + clipped && number(&errors["bias"]) > 0.0, "{baked}");
     // The other camera of the same scene, and other light.
     let (rooms_scene, output) = (scene("two_rooms_open"), rooms.folder.path().join("refused"));
     let start = ["render", text(&rooms_scene), text(&rooms.baked.path), "-o", text(&output), "--size", "32x18"];

@@ -15,6 +15,8 @@ pub struct Placement {
     pub positions: Vec<Vec3>,
     /// Whether any surface lies in the probe's cells.
     pub sampled: Vec<bool>,
+    /// Whether any surface can ask the probe: the others are baked for whom wants them, and must change nothing.
+    pub asked: Vec<bool>,
     /// Probes moved from their grid points.
     pub relocated: usize,
     /// What surfaces see of their probes; `None` where the method does not ask.

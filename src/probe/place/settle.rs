@@ -71,6 +71,7 @@ pub fn settle_all(world: &World, task: &PlacementTask) -> Placement {
         rays: found.iter().map(|f| f.rays).sum(),
         states: found.iter().map(|f| f.state).collect(),
         positions: found.iter().map(|f| f.position).collect(),
+        asked: sampled.clone(),
         sampled,
         survey: None,
     }

@@ -33,20 +33,21 @@ pub fn place(world: &World, task: &PlacementTask, surveying: impl FnOnce()) -> P
     // weigh nothing.
     if occlusion.keeps_survey() {
         table.far = need::far_probes(world, grid, &placement, &table, &settings.survey);
-        if !settings.keep_unsampled {
-            retire_unseen(&world.scene.mesh, grid, &mut placement, &table);
-        }
+        leave_unseen(&world.scene.mesh, grid, &mut placement, &table, settings.keep_unsampled);
     }
     placement.survey = Some(table);
     placement
 }
 
-/// Active probes that no surface sees are not worth baking.
-fn retire_unseen(mesh: &Mesh, grid: &Grid, placement: &mut Placement, table: &SurfaceVisibility) {
+/// Active probes that no surface sees are asked by none, and not worth baking unless they are to be kept.
+fn leave_unseen(mesh: &Mesh, grid: &Grid, placement: &mut Placement, table: &SurfaceVisibility, keep: bool) {
     let mut seen = need::seen_probes(mesh, grid, placement, table, |_| true);
     table.far.iter().for_each(|&(_, probe)| seen[probe as usize] = true);
+    for (asked, &seen) in placement.asked.iter_mut().zip(&seen) {
+        *asked &= seen;
+    }
     for (state, seen) in placement.states.iter_mut().zip(seen) {
-        if *state == ProbeState::Active && !seen {
+        if *state == ProbeState::Active && !seen && !keep {
             *state = ProbeState::NeverSampled;
         }
     }

@@ -100,6 +100,16 @@ impl Prepared<'_, '_> {
             gathers_emission: false,
         };
         let mut retraced_s = 0.0;
+        // A pilot is captured and solved beforehand; then there are more rays.
+        let rough_bounces = config.transport.rough_bounces();
+        let guided = self.capture.rays.guided().filter(|_| rough_bounces > 0);
+        let (times, pilot_captures, pilot_bounces) = match guided {
+            Some((_, per_texel, guided)) => {
+                (1.0 + f64::from(guided) / per_texel as f64, 1.0, f64::from(1 + rough_bounces))
+            }
+            None => (1.0, 0.0, 0.0),
+        };
+        let bytes = bytes * times;
         let budget = circumstances.memory_budget_bytes.unwrap_or(u64::MAX);
         if bytes > 0.0 && bytes > budget as f64 {
             retraced_s = capture_s * (1.0 - budget as f64 / bytes);
@@ -112,8 +122,8 @@ impl Prepared<'_, '_> {
         let once = config.transport.captures_once();
         Prediction {
             survey_s: self.survey_s,
-            capture_s: if once { capture_s } else { 0.0 },
-            bounce_s: bounce_s + if once { retraced_s } else { capture_s },
+            capture_s: if once { capture_s * (pilot_captures + times) + pilot_bounces * bounce_s } else { 0.0 },
+            bounce_s: bounce_s * times + if once { retraced_s } else { capture_s },
             bounces,
             capture_bytes: if once { (bytes as u64).min(budget) } else { 0 },
             map_bytes: self.memory.standing(),

@@ -267,3 +267,6 @@ fn row<C: Captures>(
     lobes.extend(builder.answers.into_iter().flat_map(Answers::lobes));
     Some(Row { own: operator.filtered(&radiance), lobes, non_finite: non_finite + lost })
 }
+
+#[cfg(test)]
+mod tests;

@@ -34,6 +34,10 @@ pub enum Purpose {
     AirPaths = 18,
     /// Shifts of grids against the scene.
     Offsets = 19,
+    /// Points that probes are fitted at.
+    FitPoints = 20,
+    /// Paths from these points.
+    FitPaths = 21,
 }
 
 /// A source of numbers for random decisions: a [`Random`] stream, or a point of an evenly distributed set

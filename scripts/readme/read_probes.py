@@ -39,12 +39,18 @@ class Probes:
         if "query" in self.meta:  # older files say it in their configuration
             self.check_weights(json.loads(self.meta["query"])["weights"])
         grid = json.loads(self.meta["grid"])
-        if grid["kind"] != "uniform" or "irradiance" not in self.tensors:
-            sys.exit("this script knows uniform grids of irradiance maps only")
+        stored = "irradiance" in self.tensors or ("sh" in self.tensors and self.meta["sh.presampled"] == "null")
+        if grid["kind"] != "uniform" or not stored:
+            sys.exit("this script knows uniform grids of irradiance maps or of coefficients only")
         self.origin, self.spacing = np.array(grid["origin"]), np.array(grid["spacing"], np.float32)
         self.divisions, self.border = np.array(grid["divisions"]), grid["border"]
         self.cells = np.maximum(self.divisions - 1, 1)
-        self.maps = self.unpack_irradiance()
+        self.maps = self.unpack_irradiance() if "irradiance" in self.tensors else None
+        if self.maps is None:
+            scale = float(self.meta["scale.irradiance"])
+            self.sh = self.tensors["sh"].astype(np.float64) * scale
+            none = np.zeros((len(self.sh), 3, 3))
+            self.gradient = self.tensors.get("gradient", none).astype(np.float64) * scale
 
     def check_weights(self, weights):
         """Refuses files that are asked in another way than this script asks."""
@@ -70,8 +76,18 @@ class Probes:
             stored = np.stack(channels, axis=-1)
         return stored.astype(np.float64) * float(self.meta["scale.irradiance"])
 
-    def probe_irradiance(self, probe, direction):
+    def harmonics(self, probe, d, position_world):
+        """W/m², nine functions; the mean changes on the way from the probe."""
+        x, y, z = d
+        functions = np.array([1, y, z, x, x * y, y * z, 3 * z * z - 1, x * z, x * x - y * y])
+        functions *= np.sqrt(np.array([1 / 4, 3 / 4, 3 / 4, 3 / 4, 15 / 4, 15 / 4, 5 / 16, 15 / 4, 15 / 16]) / np.pi)
+        way = (position_world - self.origin - self.tensors["position"][probe]) / self.spacing
+        return functions @ self.sh[probe] + np.sqrt(1 / 4 / np.pi) * np.clip(way, -2, 2) @ self.gradient[probe]
+
+    def probe_irradiance(self, probe, direction, position_world):
         """W/m². Bilinear, row = v, column = u; decoded afterwards."""
+        if self.maps is None:
+            return self.harmonics(probe, direction, position_world)
         side = self.maps.shape[1]
         p = (oct_from_direction(direction) * 0.5 + 0.5) * (side - 2 * self.border) - 0.5 + self.border
         p = np.clip(p, 0, side - 1)
@@ -143,7 +159,7 @@ class Probes:
         fraction = np.where(self.divisions > 1, np.clip(g - base.astype(np.float32), 0, 1), 0).astype(np.float32)
         mask, far = self.seen(g, base, fraction, geometric_normal)
         if far is not None:
-            return self.probe_irradiance(far, normal)
+            return np.maximum(self.probe_irradiance(far, normal, position_world), 0)
         total, weights = np.zeros(3), 0.0
         for i in range(8):
             step = np.array([i & 1, i >> 1 & 1, i >> 2 & 1])
@@ -151,8 +167,8 @@ class Probes:
             probe = x + self.divisions[0] * (y + self.divisions[1] * z)
             weight = np.where(step == 1, fraction, 1 - fraction).prod()
             if mask >> i & 1 and self.tensors["state"][probe] == 0 and weight > 0:
-                total, weights = total + weight * self.probe_irradiance(probe, normal), weights + weight
-        return total / weights if weights > 0 else total
+                total, weights = total + weight * self.probe_irradiance(probe, normal, position_world), weights + weight
+        return np.maximum(total / weights, 0) if weights > 0 else total
 
 
 def unit(vector):

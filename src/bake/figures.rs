@@ -20,6 +20,8 @@ pub struct Times {
     pub survey: f64,
     pub capture: f64,
     pub bounces: f64,
+    /// Choosing, tracing and solving the rows of a fit.
+    pub fit: f64,
     pub filter: f64,
     pub encode: f64,
     pub write: f64,

@@ -34,6 +34,8 @@ pub struct Memory {
     pub maps: u64,
     /// Captures that are traced at the same time.
     pub in_flight: u64,
+    /// Rows and vectors of a fit; captures are there still.
+    pub fit: u64,
 }
 
 impl Memory {
@@ -58,12 +60,14 @@ impl Memory {
             kernels: store.irradiance.filter_bytes(texels) + distance_kernel + resampling,
             maps: probes * per_probe + history,
             in_flight: (surfels_bytes(config) + distances + resampled) * rayon::current_num_threads() as u64,
+            fit: config.fit.bytes(probes, unknowns as u64),
         }
     }
 
-    /// All that is there together while bounces run, without kept captures.
+    /// All that is there together while bounces run and the fit after them, without kept captures.
     pub fn standing(&self) -> u64 {
-        self.probes.saturating_add(self.kernels).saturating_add(self.maps).saturating_add(self.in_flight)
+        let bounces = self.probes.saturating_add(self.kernels).saturating_add(self.maps);
+        bounces.saturating_add(self.in_flight).saturating_add(self.fit)
     }
 
     /// Refuses what does not fit; `captures` are the bytes of those that are kept.
@@ -88,6 +92,7 @@ impl Memory {
             (self.maps, maps, "the probes' maps"),
             (self.in_flight, capture, "one capture for each thread"),
             (captures, capture, "keeping all captures"),
+            (self.fit, "fit.rows.rows_per_probe", "the rows of the fit"),
         ];
         let largest = parts.into_iter().max_by_key(|part| part.0).unwrap_or(parts[0]);
         Err(TooLittleMemory {

@@ -12,6 +12,7 @@ use crate::probe::Volume;
 use crate::probe::capture::Capture;
 use crate::probe::container::{Container, FileError};
 use crate::probe::file::{self, Provenance, SceneRecord};
+use crate::probe::fit::{self, FitFigures};
 use crate::probe::lattice::ProbeState;
 use crate::probe::store::Occlusion;
 use crate::probe::transport::operator::Operator;
@@ -23,6 +24,8 @@ pub struct Baked {
     pub volume: Volume,
     pub container: Container,
     pub solution: Solution,
+    /// `None` where the probes hold the light where they stand.
+    pub fit: Option<FitFigures>,
     pub plan: Plan,
     pub rays: Rays,
     pub times: Times,
@@ -55,16 +58,17 @@ impl Prepared<'_, '_> {
         let (asked, unasked) = if asks { (occlusion, None) } else { (Occlusion::None, Some(occlusion)) };
         let mut volume = self.volume(asked);
         let solution = self.transport(&captures, &mut volume, circumstances, scene, &mut log)?;
+        let fit = self.fit(&mut volume, circumstances.seed, &mut log);
         let mut plan = self.plan.clone();
         let done = solution.bounces.len() as u32;
         plan.add_bounces(done, &config.transport, solution.converged, log.times.bounces);
         if let Some(unasked) = unasked {
             volume.occlusion = unasked;
         }
-        let container = self.encode(&volume, &plan, circumstances.seed, scene, &mut log);
+        let container = self.encode(&volume, &plan, fit.as_ref(), circumstances.seed, scene, &mut log);
         let Log { rays, times, numerics, .. } = log;
         let runtime_bytes = self.runtime_bytes();
-        Ok(Baked { volume, container, solution, plan, rays, times, numerics, runtime_bytes })
+        Ok(Baked { volume, container, solution, fit, plan, rays, times, numerics, runtime_bytes })
     }
 
     /// Brings light from surface to surface until it has settled; saves it now and then.
@@ -116,15 +120,41 @@ impl Prepared<'_, '_> {
         Ok(solution)
     }
 
+    /// Fits the probes to their look-ups, where that is asked for. It changes no light that bounces.
+    fn fit(&self, volume: &mut Volume, seed: u64, log: &mut Log) -> Option<FitFigures> {
+        let config = self.config;
+        if config.fit.is_none() {
+            return None;
+        }
+        let figures = log.stage(
+            |times| &mut times.fit,
+            "fitting",
+            fit::steps(&config.fit, volume.active_count()),
+            |bar| fit::run(&config.fit, self.world, &config.query, volume, seed, |steps| bar.inc(steps)),
+        );
+        log.numerics.non_finite += figures.map_or(0, |figures| figures.non_finite);
+        figures
+    }
+
     /// The volume as a file's content.
-    fn encode(&self, volume: &Volume, plan: &Plan, seed: u64, scene: &SceneRecord, log: &mut Log) -> Container {
+    fn encode(
+        &self,
+        volume: &Volume,
+        plan: &Plan,
+        fit: Option<&FitFigures>,
+        seed: u64,
+        scene: &SceneRecord,
+        log: &mut Log,
+    ) -> Container {
         let config = self.config;
         // Times stay out of the file: the same input must give the same bytes.
         let lines: Vec<_> = plan.lines.iter().map(|l| Line { saved_s: None, ..l.clone() }).collect();
         let plan = serde_json::json!({ "visibility": plan.visibility, "lines": lines });
         let (text, query) = (config.to_ron(), config.query_record());
         let border = config.store.border;
-        let provenance = Provenance { config: &text, query: &query, scene, seed, plan: &plan, border };
+        let fit = fit.map(FitFigures::record);
+        let provenance =
+            Provenance { config: &text, query: &query, scene, seed, plan: &plan, fit: fit.as_ref(), border };
         let (container, losses) = log.time(|times| &mut times.encode, || file::encode(volume, &provenance));
         log.numerics.clamped = losses.clamped;
         log.numerics.underflowed = losses.underflowed;

@@ -12,6 +12,7 @@ use crate::bake::{Baked, Checkpoint, Circumstances, Prepared, prepare};
 use crate::cli::BakeArgs;
 use crate::config::Config;
 use crate::plan::Line;
+use crate::probe::fit::FitFigures;
 use crate::probe::lattice::ProbeState;
 use crate::probe::transport::checkpoint;
 use crate::report::bake::{BakeReport, BytesPerProbe, SCHEMA, SolverReport};
@@ -202,6 +203,7 @@ fn report(baked: &Baked, config: &Config, session: &Session, file_bytes: u64, ra
         converged: baked.solution.converged,
         spectral_radius_estimate: baked.solution.spectral_radius_estimate,
         solver: SolverReport::of(&baked.solution),
+        fit: baked.fit.as_ref().map(FitFigures::report),
         numerics: baked.numerics.clone(),
         plan: baked.plan.lines.clone(),
     }

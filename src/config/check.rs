@@ -25,9 +25,12 @@ const UNIT_RULE: &str = "use a number from 0 to 1";
 impl Config {
     /// What of two stages does not go together, with the remedy, and the sections that say it; `None` where all does.
     pub(super) fn mismatch(&self) -> Option<(&'static [&'static str], String)> {
-        let Config { capture, placement, transport, store, query, .. } = self;
+        let Config { capture, placement, transport, store, fit, query, .. } = self;
         if let Some(what) = query.mismatch(&store.occlusion) {
             return Some((&["store", "query"], what));
+        }
+        if let Some(what) = fit.mismatch(query, &store.irradiance) {
+            return Some((&["fit", "query", "store"], what));
         }
         if let Some(what) = store.radiance().mismatch(capture.rays.side()) {
             return Some((&["store", "capture"], what));
@@ -105,6 +108,7 @@ impl Config {
         self.transport.check(&mut rule);
         self.store.irradiance.check(MAX_RESOLUTION, &mut rule);
         self.store.occlusion.check(MAX_RESOLUTION, &mut rule);
+        self.fit.check(&mut rule);
         self.query.check(&mut rule);
         for stage in &self.plan.keep {
             let known = STAGES.contains(&stage.as_str());

@@ -124,8 +124,7 @@ struct Tree {
 
 impl Tree {
     fn new(config: &Config) -> Tree {
-        // Plain records of numbers and enums: nothing in them can fail to serialise.
-        Tree { config: config.clone(), tree: serde_json::to_value(config).unwrap_or_default() }
+        Tree { config: config.clone(), tree: keys_of(config) }
     }
 
     fn at(&self, path: &str) -> Option<&Value> {
@@ -234,9 +233,19 @@ impl Tree {
             .map_err(|e| error(explain(&e, alone.as_ref().err(), value)))?;
         self.config.check(place)?;
         // Choices bring keys of their own.
-        self.tree = serde_json::to_value(&self.config).unwrap_or_default();
+        self.tree = keys_of(&self.config);
         Ok(())
     }
+}
+
+/// All keys of a configuration, also those that are left out where they say nothing.
+fn keys_of(config: &Config) -> Value {
+    // Plain records of numbers and enums: nothing in them can fail to serialise.
+    let mut tree = serde_json::to_value(config).unwrap_or_default();
+    if let Value::Object(sections) = &mut tree {
+        sections.entry("fit").or_insert_with(|| "none".into());
+    }
+    tree
 }
 
 /// The name of a choice, with its settings or without.

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::ron_text::ron_options;
 use crate::probe::capture::CaptureSettings;
 use crate::probe::file::{LightRecord, QUERY_VERSION, QueryRecord};
+use crate::probe::fit::Fit;
 use crate::probe::lattice::grid::GridSettings;
 use crate::probe::place::PlacementSettings;
 use crate::probe::query::QuerySettings;
@@ -22,6 +23,9 @@ pub struct Config {
     pub capture: CaptureSettings,
     pub transport: Transport,
     pub store: StoreSettings,
+    /// Left out where there is none: files and reports without a fit stay as they were before there was one.
+    #[serde(skip_serializing_if = "Fit::is_none")]
+    pub fit: Fit,
     pub query: QuerySettings,
     pub plan: PlanSettings,
 }

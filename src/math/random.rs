@@ -11,7 +11,7 @@ pub enum Purpose {
     /// Jitter of capture rays inside their texel, and the light samples at what they hit.
     Capture = 1,
     /// The same for the captures that guide others.
-    Pilot = 20,
+    Pilot = 10,
     /// Light samples at probe centres.
     ProbeEmission = 2,
     /// Rays through a pixel, which translucent surfaces stop by chance.
@@ -36,6 +36,10 @@ pub enum Purpose {
     AirPaths = 18,
     /// Shifts of grids against the scene.
     Offsets = 19,
+    /// Points that probes are fitted at.
+    FitPoints = 20,
+    /// Paths from these points.
+    FitPaths = 21,
 }
 
 /// A source of numbers for random decisions: a [`Random`] stream, or a point of an evenly distributed set

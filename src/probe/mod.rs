@@ -12,10 +12,12 @@
 //! | [`place`] | moving probes to where they are of use, and finding out what surfaces see of them |
 //! | [`capture`] | what a probe sees |
 //! | [`transport`] | light on its way between the captured surfaces and the probes |
+//! | [`fit`] | values that interpolate best, in place of those that light has where probes stand |
 
 pub mod capture;
 pub mod container;
 pub mod file;
+pub mod fit;
 pub mod lattice;
 pub mod place;
 pub mod query;

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
+use serde_json::Value;
 
 use super::header::Header;
 use crate::bake::figures::{Numerics, Rays, Times};
@@ -31,6 +32,9 @@ pub struct BakeReport {
     /// Largest Ritz value of the bounce operator, or the ratio of the last two changes where sweeps are not combined.
     pub spectral_radius_estimate: Option<f64>,
     pub solver: SolverReport,
+    /// See [`FitFigures`](crate::probe::fit::FitFigures); absent without a fit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fit: Option<Value>,
     pub numerics: Numerics,
     pub plan: Vec<Line>,
 }

@@ -35,6 +35,13 @@ pub struct RenderReport {
     pub reference: Option<ReferenceSummary>,
     /// The file's probes against the same probes lit by full paths; `null` without a traced reference.
     pub baked: Option<BakedReport>,
+    /// Whether the probes hold fitted values: then `visibility_off` says nothing of the method, for they were fitted with its
+    /// visibility. Absent where they do not.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub fitted: bool,
+    /// Why `baked` is `null` although it was asked for; absent where it was not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub baked_reason: Option<&'static str>,
     pub methods: Vec<MethodReport>,
 }
 

@@ -183,13 +183,15 @@ pub struct BakeTimes {
     pub survey: f64,
     pub capture: f64,
     pub bounces: f64,
+    #[serde(default)]
+    pub fit: f64,
     pub filter: f64,
     pub encode: f64,
 }
 
 impl BakeTimes {
     pub fn total(&self) -> f64 {
-        self.survey + self.capture + self.bounces + self.filter + self.encode
+        self.survey + self.capture + self.bounces + self.fit + self.filter + self.encode
     }
 }
 

@@ -20,7 +20,7 @@ use crate::math::blocks::{BLOCK, Block};
 use crate::math::random::{Purpose, Random};
 use crate::math::sampling::uniform_sphere;
 use crate::probe::Volume;
-use crate::probe::place::{SettleSettings, Settler};
+use crate::probe::place::{SettleSettings, Settler, air};
 use crate::probe::query::{Query, QueryPoint};
 use crate::probe::store::surface::Facing;
 use crate::trace::Ray;
@@ -104,21 +104,9 @@ pub fn points(world: &World, volume: &Volume, seed: u64) -> Vec<QueryPoint> {
     (0..POINTS).into_par_iter().filter_map(|index| point(world, volume, seed, index)).collect()
 }
 
-/// The box of the points, relative to the scene's origin: that of the scene as far as the probes' hull covers it. What the
-/// hull has beyond is no air that anything moves through, and volumes that cover the scene share their points. Along axes
-/// in which the scene is flat the hull counts.
+/// The box of the points, see [`air::bounds`].
 pub fn bounds(world: &World, volume: &Volume) -> (Vec3, Vec3) {
-    /// Spacings.
-    const FLAT: f32 = 1e-3;
-    let hull = volume.grid.hull(0.0);
-    let scene = world.scene.mesh.bounds().unwrap_or(hull);
-    let (mut low, mut high) = (hull.0.max(scene.0), hull.1.min(scene.1));
-    for axis in 0..3 {
-        if high[axis] - low[axis] <= FLAT * volume.grid.spacing_max() {
-            (low[axis], high[axis]) = (hull.0[axis], hull.1[axis]);
-        }
-    }
-    (low, high)
+    air::bounds(world, &volume.grid)
 }
 
 /// The point of an index; `None` where all that is tried lies inside geometry.

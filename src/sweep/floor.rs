@@ -107,19 +107,29 @@ pub fn measure(
     }
     let exact = error_of(base, VisibilityMode::Ray);
     causes.insert(2, cause("leaks_in_shading", "exact visibility by rays (visibility_ray)", exact));
-    let truth = setting.obtain_truth(label, config, seed, warn)?;
-    step();
-    let lit = truth.visibility_on.error_relative;
-    causes.push(cause("bake", "probes lit by full paths", lit));
-    // What right probes under exact visibility still err, no bake can take away: it is the interpolation's own.
-    let own = truth.visibility_ray.error_relative;
-    causes.push(FloorCause {
-        cause: "interpolation",
-        how: "path-lit probes with exact visibility (path_ray) err by it alone".to_owned(),
-        // None where other errors make up for a part of it.
-        error_relative: all.zip(own).filter(|(all, own)| all >= own).map(|(all, own)| (all * all - own * own).sqrt()),
-        share: all.zip(own).filter(|(all, _)| *all > 0.0).map(|(all, own)| (own / all).powi(2)),
-    });
+    if config.fit.is_none() {
+        let truth = setting.obtain_truth(label, config, seed, warn)?;
+        step();
+        let lit = truth.visibility_on.error_relative;
+        causes.push(cause("bake", "probes lit by full paths", lit));
+        // What right probes under exact visibility still err, no bake can take away: it is the interpolation's own.
+        let own = truth.visibility_ray.error_relative;
+        causes.push(FloorCause {
+            cause: "interpolation",
+            how: "path-lit probes with exact visibility (path_ray) err by it alone".to_owned(),
+            // None where other errors make up for a part of it.
+            error_relative: all
+                .zip(own)
+                .filter(|(all, own)| all >= own)
+                .map(|(all, own)| (all * all - own * own).sqrt()),
+            share: all.zip(own).filter(|(all, _)| *all > 0.0).map(|(all, own)| (own / all).powi(2)),
+        });
+    } else {
+        // Fitted values have little to do with the light where probes stand.
+        let how = "not measured: the probes hold fitted values";
+        causes.extend(["bake", "interpolation"].map(|name| cause(name, how, None)));
+        step();
+    }
     Ok(FloorReport {
         ladder: ladder.to_owned(),
         configuration: index,

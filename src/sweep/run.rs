@@ -117,7 +117,8 @@ impl Setting<'_, '_> {
         let record = TruthRecord {
             visibility_on: figures(&mut on),
             visibility_ray: figures(&mut ray),
-            baked: truth.report.figures,
+            // Of fitted values there are none.
+            baked: if config.fit.is_none() { truth.report.figures } else { Default::default() },
         };
         self.store.save(&key, &record, None)?;
         Ok(record)
@@ -175,6 +176,7 @@ impl Setting<'_, '_> {
             survey: baked.times.survey,
             capture: baked.times.capture,
             bounces: baked.times.bounces,
+            fit: baked.times.fit,
             filter: baked.times.filter,
             encode: baked.times.encode,
         };

@@ -22,6 +22,7 @@ use crate::light::World;
 use crate::probe::Volume;
 use crate::probe::file::{self, ProbeFile};
 use crate::probe::query::Query;
+use crate::report::baked;
 use crate::report::render::{RenderReport, RenderTimes, SCHEMA};
 use crate::scene::{Camera, Detail};
 use crate::shade::points::see;
@@ -149,7 +150,8 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
         let query = Query { volume: &truth.volume, settings };
         scenery.shade_again(&query, seen, VisibilityMode::Ray, PATH_RAY, &shaded[2].report)
     });
-    let baked = run.truth.as_ref().map(|t| t.report.clone());
+    let fitted = run.probes.fit.is_some();
+    let baked = run.truth.as_ref().filter(|_| !fitted).map(|t| t.report.clone());
     for s in &mut shaded {
         s.report.leak.baked = baked.as_ref().and_then(|b| b.figures.light);
     }
@@ -186,6 +188,8 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
         peak_memory_bytes: peak_memory_bytes(),
         reference: reference.map(|r| r.summary),
         baked,
+        fitted,
+        baked_reason: (fitted && run.truth.is_some()).then_some(baked::FITTED),
         methods: shaded.into_iter().chain(path_traced).map(|s| s.report).collect(),
     };
     write_json(&folder.join("report.json"), &report)?;

@@ -52,7 +52,11 @@ pub fn table(report: &RenderReport) -> String {
     );
     text.extend(report.methods.iter().map(|method| format!("\n{}", air_line(method))));
     let baked = report.baked.as_ref().filter(|b| b.figures.bias.is_some()).map(baked_line);
-    for line in error_lines(report, mean).into_iter().chain(baked) {
+    if report.fitted {
+        text.push_str("\nfitted probes: the row without visibility says nothing of the method");
+    }
+    let reason = report.baked_reason.map(|reason| format!("no figure of the bake itself: {reason}"));
+    for line in error_lines(report, mean).into_iter().chain(baked).chain(reason) {
         text.push('\n');
         text.push_str(&line);
     }

@@ -28,6 +28,9 @@ use super::store::{Irradiance, Occlusion};
 /// The tensor that says which probe stands for which point of a mixed grid, see [`Tree`].
 const GRID_INDEX: &str = "grid_index";
 
+/// Metadata key of what a fit did.
+const FIT_KEY: &str = "fit";
+
 /// Value of the metadata key `format`.
 pub const FORMAT: &str = "lightprobe/1";
 
@@ -43,6 +46,8 @@ pub struct Provenance<'a> {
     pub scene: &'a SceneRecord,
     pub seed: u64,
     pub plan: &'a Value,
+    /// What a fit did, where one gave the light.
+    pub fit: Option<&'a Value>,
     /// Border texels of the volume's maps.
     pub border: usize,
 }
@@ -60,6 +65,8 @@ pub struct ProbeFile {
     /// Seed of the bake's random numbers; `None` where the file does not say.
     pub seed: Option<u64>,
     pub plan: Value,
+    /// What the fit did that gave its light; `None` where probes hold the light where they stand.
+    pub fit: Option<Value>,
     /// Bytes of every tensor.
     pub tensor_bytes: BTreeMap<String, u64>,
     /// Number type and shape of every tensor, for listings.
@@ -104,6 +111,9 @@ pub fn encode(volume: &Volume, provenance: &Provenance) -> (Container, EncodingL
     container.put_json("scene", provenance.scene);
     container.put_json("seed", &provenance.seed);
     container.put_json("plan", provenance.plan);
+    if let Some(fit) = provenance.fit {
+        container.put_json(FIT_KEY, fit);
+    }
     (container, losses)
 }
 
@@ -177,6 +187,7 @@ fn decode(container: &Container, file_bytes: u64) -> Result<ProbeFile, String> {
         scene: container.json("scene")?,
         seed: container.metadata.contains_key("seed").then(|| container.json("seed")).transpose()?,
         plan: container.json("plan")?,
+        fit: container.metadata.contains_key(FIT_KEY).then(|| container.json(FIT_KEY)).transpose()?,
         tensor_bytes: container.tensors.iter().map(|(n, t)| (n.clone(), t.bytes.len() as u64)).collect(),
         tensor_shapes: container.tensors.iter().map(shape).collect(),
         file_bytes,
@@ -200,8 +211,9 @@ impl ProbeFile {
 
     /// Where the file was made from, with another configuration.
     pub fn provenance<'a>(&'a self, config: &'a str) -> Provenance<'a> {
-        let ProbeFile { query, scene, plan, border, .. } = self;
-        Provenance { config, query, scene, seed: self.seed.unwrap_or(0), plan, border: *border }
+        let ProbeFile { query, scene, plan, fit, border, .. } = self;
+        let (seed, border) = (self.seed.unwrap_or(0), *border);
+        Provenance { config, query, scene, seed, plan, fit: fit.as_ref(), border }
     }
 
     /// The volume without what the plan found unnecessary, should the file hold it all the same.

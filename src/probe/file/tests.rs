@@ -48,7 +48,8 @@ fn record() -> QueryRecord {
 fn written(visibility: bool) -> Container {
     let scene = SceneRecord { name: "a".into(), blake3: "b".into() };
     let (query, plan) = (record(), json!({ "visibility": visibility, "lines": [] }));
-    let provenance = Provenance { config: "()", query: &query, scene: &scene, seed: 7, plan: &plan, border: 1 };
+    let provenance =
+        Provenance { config: "()", query: &query, scene: &scene, seed: 7, plan: &plan, fit: None, border: 1 };
     encode(&volume(), &provenance).0
 }
 

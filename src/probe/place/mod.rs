@@ -2,6 +2,7 @@
 //!
 //! Probes that no surface can ever ask, and those inside geometry, are not worth baking.
 
+pub mod air;
 mod ddgi;
 pub mod need;
 pub mod overlap;

@@ -3,11 +3,12 @@
 use glam::{Vec2, Vec3};
 
 use super::corner_test::{CornerTest, Mask, MomentsTest, SurfaceTest, TilesTest};
-use super::point::{CornerWeights, QueryPoint, Visibility};
+use super::point::{CornerWeights, Part, QueryPoint, Visibility};
 use super::settings::{LookUp, QuerySettings, VisibilityTest, WeightNormal};
 use crate::math::octahedral::oct_from_direction;
 use crate::probe::Volume;
 use crate::probe::lattice::grid::{Cell, ProbeIndex};
+use crate::probe::store::Irradiance;
 
 /// A volume and the way to ask it.
 #[derive(Clone, Copy)]
@@ -141,19 +142,47 @@ impl<'v> Query<'v> {
     pub fn blend(&self, corners: &CornerWeights, point: &QueryPoint, oct: Vec2) -> Vec3 {
         let Some(shares) = corners.shares() else { return Vec3::ZERO };
         let shares = shares.map(|(corner, share)| (corners.probes[corner].0 as usize, share));
+        let offset = |probe| self.offset(point, probe);
         let forward = |e| self.settings.blend.forward(e);
         let sum = match self.settings.look_up {
-            LookUp::Normal => self.volume.irradiance.sum(oct, shares, forward),
+            LookUp::Normal => self.volume.irradiance.sum(oct, shares, offset, forward),
             LookUp::Towards => {
                 let biased = self.biased(point);
                 let of = |(probe, share)| {
                     let oct = self.towards(probe, biased, point.normal);
-                    self.volume.irradiance.sum(oct, [(probe, share)].into_iter(), forward)
+                    self.volume.irradiance.sum(oct, [(probe, share)].into_iter(), offset, forward)
                 };
                 shares.map(of).sum()
             }
         };
         self.settings.blend.backward(sum).into()
+    }
+
+    /// The parts that [`Self::irradiance`] adds up, where that is linear: each probe's share, the direction that it is asked
+    /// around and how far it is.
+    pub fn parts(&self, corners: &CornerWeights, point: &QueryPoint) -> Vec<Part> {
+        let total = corners.weights.iter().map(|w| f64::from(*w)).sum::<f64>();
+        let biased = self.biased(point);
+        let counted = corners.probes.iter().zip(corners.weights).filter(|(_, weight)| *weight > 0.0);
+        let part = |(probe, weight): (&ProbeIndex, f32)| {
+            let p = probe.0 as usize;
+            let oct = match self.settings.look_up {
+                LookUp::Normal => oct_from_direction(point.normal),
+                LookUp::Towards => self.towards(p, biased, point.normal),
+            };
+            let share = (f64::from(weight) / total) as f32;
+            Part { probe: *probe, share, oct, offset: self.offset(point, p) }
+        };
+        counted.map(part).collect()
+    }
+
+    /// How far a point is from a probe, in the spacings of that probe, as [`Irradiance::sum`] takes it.
+    #[inline]
+    fn offset(&self, point: &QueryPoint, probe: usize) -> Vec3 {
+        let Volume { positions, grid, .. } = self.volume;
+        let spacing = grid.spacing() * grid.width(ProbeIndex(probe as u32)) as f32;
+        let farthest = Vec3::splat(Irradiance::FARTHEST);
+        ((point.position - positions[probe]) / spacing).clamp(-farthest, farthest)
     }
 
     /// Where a probe's irradiance is read for a point that asks for it around `normal`, see [`LookUp::Towards`].

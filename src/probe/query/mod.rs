@@ -15,5 +15,5 @@ mod settings;
 mod tests;
 
 pub use self::look_up::{Query, trilinear};
-pub use self::point::{CornerWeights, QueryPoint, Visibility};
+pub use self::point::{CornerWeights, Part, QueryPoint, Visibility};
 pub use self::settings::{BiasSpacing, Blend, DirectionWeight, LookUp, QuerySettings, VisibilityTest, WeightNormal};

@@ -1,6 +1,6 @@
 //! What asks, and which weights it gets.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use crate::probe::lattice::ProbeIndex;
 use crate::probe::store::surface::Facing;
@@ -44,6 +44,18 @@ impl Visibility {
 pub struct CornerWeights {
     pub probes: [ProbeIndex; 8],
     pub weights: [f32; 8],
+}
+
+/// What one probe adds to a look-up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Part {
+    pub probe: ProbeIndex,
+    /// All shares of a look-up sum to 1.
+    pub share: f32,
+    /// Direction that the probe's irradiance is read around.
+    pub oct: Vec2,
+    /// From the probe to the point, in the probe's spacings, clipped.
+    pub offset: Vec3,
 }
 
 impl CornerWeights {

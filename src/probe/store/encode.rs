@@ -187,6 +187,25 @@ pub fn encode_colors(texels: &[Vec3], format: ColorFormat) -> EncodedColors {
     EncodedColors { format, bytes, scale, clamped, underflowed }
 }
 
+/// Encodes numbers of either sign ÷ `scale`; `f32` where the format has no signs. Inverse of [`decode_colors`].
+pub fn encode_signed(numbers: impl Iterator<Item = f32>, format: ColorFormat, scale: f32) -> EncodedColors {
+    let mut encoded = EncodedColors { format, bytes: Vec::new(), scale, clamped: 0, underflowed: 0 };
+    for number in numbers {
+        let scaled = number / scale;
+        encoded.clamped += u64::from(scaled.is_nan() || scaled.abs() > format.max());
+        let held = if scaled.is_nan() { 0.0 } else { scaled.clamp(-format.max(), format.max()) };
+        match format {
+            ColorFormat::F16 => {
+                let code = f16::from_f32(held);
+                encoded.underflowed += u64::from(held != 0.0 && code.to_f32() == 0.0);
+                encoded.bytes.extend(code.to_le_bytes());
+            }
+            ColorFormat::F32 | ColorFormat::R11G11B10F => encoded.bytes.extend(held.to_le_bytes()),
+        }
+    }
+    encoded
+}
+
 /// The nearest finite number; 0 for NaN.
 fn finite(value: f32) -> f32 {
     if value.is_nan() { 0.0 } else { value.clamp(f32::MIN, f32::MAX) }

@@ -1,5 +1,6 @@
 //! Irradiance as probes hold it: the settings, the values in memory, and the linear unknowns that the solver works on.
 
+mod factors;
 mod settings;
 
 use std::borrow::Cow;
@@ -9,6 +10,7 @@ use rayon::prelude::*;
 use safetensors::Dtype;
 use serde_json::Value;
 
+pub use self::factors::Factors;
 pub use self::settings::{Fineness, IrradianceCurve, IrradianceStore, OctahedralStore};
 use super::encode::{ColorFormat, decode_colors, encode_colors};
 use super::kernel::{Directions, Kernel};
@@ -61,9 +63,19 @@ impl Lobes {
 }
 
 impl Irradiance {
-    /// Σ weight · forward(irradiance around `oct`) over some probes, W·m⁻².
+    /// Offsets along an axis are clipped to this many spacings either way.
+    pub const FARTHEST: f32 = sh::FARTHEST;
+
+    /// Σ weight · forward(irradiance around `oct`) over some probes, W·m⁻²; `offset` tells how far a probe is from the point
+    /// that asks, see [`Self::FARTHEST`].
     #[inline]
-    pub fn sum(&self, oct: Vec2, parts: impl Iterator<Item = (usize, f32)>, forward: impl Fn(Vec3A) -> Vec3A) -> Vec3A {
+    pub fn sum(
+        &self,
+        oct: Vec2,
+        parts: impl Iterator<Item = (usize, f32)>,
+        offset: impl Fn(usize) -> Vec3,
+        forward: impl Fn(Vec3A) -> Vec3A,
+    ) -> Vec3A {
         match self {
             Irradiance::Maps { maps, curve, .. } => {
                 // One direction serves all probes.
@@ -74,7 +86,7 @@ impl Irradiance {
                 }
                 sum
             }
-            Irradiance::Sh9(sh) => sh.sum(oct, parts, forward),
+            Irradiance::Sh9(sh) => sh.sum(oct, parts, offset, forward),
         }
     }
 

@@ -3,14 +3,19 @@
 //! `E(n) = Σ c_j·Y_j(n)` with the functions of [`harmonics`]. The solver's unknowns are `c_j·Y₀`: the first is the mean
 //! irradiance, and all have its unit. Where it is presampled, shading reads an octahedral map of the sum instead, of
 //! R11G11B10F texels with a border of one: values below 0, which nine coefficients give beside bright lights, become 0.
+//!
+//! With a gradient ([`gradient`]) a point beside the probe adds the change of the mean on its way there.
+
+mod gradient;
 
 use glam::{Vec2, Vec3, Vec3A};
-use half::f16;
 use rayon::prelude::*;
 use safetensors::Dtype;
 use serde::{Deserialize, Serialize};
 
-use super::encode::{ColorFormat, decode_colors, encode_colors, scale_for};
+pub use self::gradient::FARTHEST;
+use self::gradient::Gradient;
+use super::encode::{ColorFormat, decode_colors, encode_colors, encode_signed, scale_for};
 use super::map::{OctahedralMaps, fill_with_border};
 use crate::math::harmonics::{self, COUNT, Y0};
 use crate::math::octahedral::{direction_from_oct, texel_direction};
@@ -24,11 +29,13 @@ pub struct ShStore {
     pub format: ColorFormat,
     /// Interior texels per side of the maps that shading reads; `None`: it evaluates the functions.
     pub presampled: Option<usize>,
+    /// Whether each probe also holds the gradient of its mean irradiance: a fit fills it, and without one it is 0.
+    pub gradient: bool,
 }
 
 impl Default for ShStore {
     fn default() -> Self {
-        ShStore { format: ColorFormat::F32, presampled: None }
+        ShStore { format: ColorFormat::F32, presampled: None, gradient: false }
     }
 }
 
@@ -48,7 +55,7 @@ impl ShStore {
     pub fn runtime_bytes(&self) -> usize {
         match self.presampled {
             Some(resolution) => (resolution + 2 * BORDER).pow(2) * PRESAMPLED.bytes_per_texel(),
-            None => COUNT * self.format.bytes_per_texel(),
+            None => (COUNT + if self.gradient { gradient::AXES } else { 0 }) * self.format.bytes_per_texel(),
         }
     }
 
@@ -71,6 +78,12 @@ impl ShStore {
         if let Some(n) = self.presampled {
             let holds = (1..=most_texels).contains(&n);
             rule("store.irradiance.sh9.presampled", n.to_string(), holds, "use 1 to 1024 texels, or None");
+            rule(
+                "store.irradiance.sh9.presampled",
+                n.to_string(),
+                !self.gradient,
+                "maps hold no gradient: use None with one",
+            );
         }
     }
 }
@@ -84,21 +97,24 @@ pub struct ShIrradiance {
     format: ColorFormat,
     /// What shading reads, W·m⁻².
     presampled: Option<OctahedralMaps<Vec3A>>,
+    gradient: Option<Gradient>,
 }
 
 /// A direction, made ready once for all probes that are asked around it.
 #[derive(Debug, Clone, Copy)]
-pub struct Functions([f32; COUNT]);
+pub struct Functions(pub [f32; COUNT]);
 
 impl ShIrradiance {
     pub fn zeros(store: &ShStore, probes: usize) -> ShIrradiance {
         let maps = |resolution| OctahedralMaps::new(probes, resolution, BORDER, Vec3A::ZERO);
         let presampled = store.presampled.map(maps);
-        ShIrradiance { coefficients: vec![Vec3A::ZERO; COUNT * probes], format: store.format, presampled }
+        let gradient = store.gradient.then(|| Gradient::zeros(probes));
+        ShIrradiance { coefficients: vec![Vec3A::ZERO; COUNT * probes], format: store.format, presampled, gradient }
     }
 
     pub fn store(&self) -> ShStore {
-        ShStore { format: self.format, presampled: self.presampled.as_ref().map(|maps| maps.resolution) }
+        let presampled = self.presampled.as_ref().map(|maps| maps.resolution);
+        ShStore { format: self.format, presampled, gradient: self.gradient.is_some() }
     }
 
     /// Most by which irradiance may exceed π times the largest radiance, as a factor.
@@ -110,14 +126,21 @@ impl ShIrradiance {
         &self.coefficients[probe * COUNT..(probe + 1) * COUNT]
     }
 
-    /// Irradiance of a probe around the direction `oct`, W·m⁻².
+    /// Irradiance of a probe around the direction `oct` where it stands, W·m⁻².
     pub fn at(&self, probe: usize, oct: Vec2) -> Vec3A {
-        self.sum(oct, [(probe, 1.0)].into_iter(), |e| e)
+        self.sum(oct, [(probe, 1.0)].into_iter(), |_| Vec3::ZERO, |e| e)
     }
 
-    /// Σ weight · forward(irradiance around `oct`) over some probes.
+    /// Σ weight · forward(irradiance around `oct`) over some probes; `offset` tells how far a probe is from the point, in its
+    /// spacings.
     #[inline]
-    pub fn sum(&self, oct: Vec2, parts: impl Iterator<Item = (usize, f32)>, forward: impl Fn(Vec3A) -> Vec3A) -> Vec3A {
+    pub fn sum(
+        &self,
+        oct: Vec2,
+        parts: impl Iterator<Item = (usize, f32)>,
+        offset: impl Fn(usize) -> Vec3,
+        forward: impl Fn(Vec3A) -> Vec3A,
+    ) -> Vec3A {
         match &self.presampled {
             Some(maps) => {
                 let taps = maps.taps(oct);
@@ -125,7 +148,14 @@ impl ShIrradiance {
             }
             None => {
                 let functions = Functions(harmonics::basis(direction_from_oct(oct)));
-                parts.map(|(probe, weight)| forward(evaluate(self.of_probe(probe), &functions)) * weight).sum()
+                let at = |probe| evaluate(self.of_probe(probe), &functions);
+                match &self.gradient {
+                    None => parts.map(|(probe, weight)| forward(at(probe)) * weight).sum(),
+                    Some(gradient) => {
+                        let there = |probe| at(probe) + gradient.change(probe, offset(probe));
+                        parts.map(|(probe, weight)| forward(there(probe)) * weight).sum()
+                    }
+                }
             }
         }
     }
@@ -144,6 +174,35 @@ impl ShIrradiance {
     #[inline]
     pub fn unknown(&self, probe: usize, j: usize) -> Vec3A {
         self.coefficients[probe * COUNT + j] * Y0
+    }
+
+    /// The functions that shading reads at the texels of its maps, borders included; `None`: it evaluates them itself.
+    pub fn presampled(&self) -> Option<(&OctahedralMaps<Vec3A>, Vec<Functions>)> {
+        let maps = self.presampled.as_ref()?;
+        let interior = texel_functions(maps.resolution);
+        let mut all = vec![Functions([0.0; COUNT]); maps.texels_per_probe()];
+        fill_with_border(&interior, maps.resolution, BORDER, &mut all);
+        Some((maps, all))
+    }
+
+    /// Unknowns of a fit of one probe: its coefficients and, with a gradient, the three of that.
+    pub fn fitted_unknowns(&self) -> usize {
+        COUNT + if self.gradient.is_some() { gradient::AXES } else { 0 }
+    }
+
+    /// These of a probe, W·m⁻²: all times Y₀.
+    pub fn fitted(&self, probe: usize) -> Vec<Vec3A> {
+        let gradient = self.gradient.iter().flat_map(|gradient| gradient.of(probe).map(|g| g * Y0));
+        self.probe(probe).chain(gradient).collect()
+    }
+
+    /// Sets them.
+    pub fn set_fitted(&mut self, probe: usize, values: &[Vec3A]) {
+        let (coefficients, slopes) = values.split_at(COUNT);
+        self.set_probe(probe, coefficients);
+        if let (Some(gradient), [x, y, z]) = (&mut self.gradient, slopes) {
+            gradient.set(probe, [x, y, z].map(|g| *g / Y0));
+        }
     }
 
     /// The unknowns of one probe, W·m⁻².
@@ -179,8 +238,12 @@ impl ShIrradiance {
             coefficients.iter_mut().zip(values).for_each(|(c, value)| *c = value / Y0);
             Some(result)
         };
-        let results = self.coefficients.par_chunks_mut(COUNT).enumerate().map(set).collect();
+        let results: Vec<Option<R>> = self.coefficients.par_chunks_mut(COUNT).enumerate().map(set).collect();
         self.presample();
+        // A gradient belongs to the coefficients that it was fitted with.
+        if let Some(gradient) = &mut self.gradient {
+            (0..results.len()).filter(|&p| results[p].is_some()).for_each(|p| gradient.set(p, Default::default()));
+        }
         results
     }
 
@@ -188,6 +251,9 @@ impl ShIrradiance {
     pub fn set_probe(&mut self, probe: usize, values: &[Vec3A]) {
         let coefficients = &mut self.coefficients[probe * COUNT..(probe + 1) * COUNT];
         coefficients.iter_mut().zip(values).for_each(|(c, value)| *c = *value / Y0);
+        if let Some(gradient) = &mut self.gradient {
+            gradient.set(probe, Default::default());
+        }
         if let Some(maps) = &mut self.presampled {
             let functions = texel_functions(maps.resolution);
             sample(coefficients, &functions, maps.resolution, maps.probe_mut(probe));
@@ -209,10 +275,11 @@ impl ShIrradiance {
             coefficients: probes.iter().flat_map(|&probe| self.of_probe(probe).iter().copied()).collect(),
             format: self.format,
             presampled: self.presampled.as_ref().map(|maps| maps.of_probes(probes)),
+            gradient: self.gradient.as_ref().map(|gradient| gradient.of_probes(probes)),
         }
     }
 
-    /// Coefficients, for checkpoints; inverse of [`Self::restore`].
+    /// Coefficients, for checkpoints; inverse of [`Self::restore`]. Gradients come after the last of these.
     pub fn stored(&self) -> impl ExactSizeIterator<Item = Vec3> + '_ {
         self.coefficients.iter().map(|&c| c.into())
     }
@@ -233,32 +300,28 @@ impl ShIrradiance {
             Some(maps) => format!(", presampled to {0}×{0} texels, {1}", maps.resolution, PRESAMPLED.name()),
             None => String::new(),
         };
-        format!("{COUNT} coefficients of spherical harmonics, {}{read}", self.format.name())
+        let gradient = if self.gradient.is_some() { " and the gradient of the mean" } else { "" };
+        format!("{COUNT} coefficients of spherical harmonics{gradient}, {}{read}", self.format.name())
     }
 
     /// Writes its tensor.
     pub fn write(&self, container: &mut Container, losses: &mut EncodingLosses) {
-        let largest = |values: &[Vec3A]| values.iter().map(|c| c.abs().max_element()).fold(0.0, f32::max);
-        let scale = scale_for(largest(&self.coefficients), self.format);
-        let (mut bytes, mut clamped, mut underflowed) = (Vec::new(), 0, 0);
-        for number in self.coefficients.iter().flat_map(|c| c.to_array()) {
-            let scaled = number / scale;
-            clamped += u64::from(scaled.is_nan() || scaled.abs() > self.format.max());
-            let held = if scaled.is_nan() { 0.0 } else { scaled.clamp(-self.format.max(), self.format.max()) };
-            match self.format {
-                ColorFormat::F16 => {
-                    let code = f16::from_f32(held);
-                    underflowed += u64::from(held != 0.0 && code.to_f32() == 0.0);
-                    bytes.extend(code.to_le_bytes());
-                }
-                ColorFormat::F32 | ColorFormat::R11G11B10F => bytes.extend(held.to_le_bytes()),
-            }
+        let slopes = || self.gradient.iter().flat_map(Gradient::numbers);
+        let largest = self.coefficients.iter().chain(slopes()).map(|c| c.abs().max_element()).fold(0.0, f32::max);
+        let scale = scale_for(largest, self.format);
+        let probes = self.coefficients.len() / COUNT;
+        let mut put = |name: &str, per_probe: usize, numbers: &mut dyn Iterator<Item = &Vec3A>| {
+            let encoded = encode_signed(numbers.flat_map(|c| c.to_array()), self.format, scale);
+            container.put_bytes(name, self.format.dtype(), &[probes, per_probe, 3], encoded.bytes);
+            losses.clamped.insert(name.to_owned(), encoded.clamped);
+            losses.underflowed.insert(name.to_owned(), encoded.underflowed);
+        };
+        put(TENSOR, COUNT, &mut self.coefficients.iter());
+        if self.gradient.is_some() {
+            put(gradient::TENSOR, gradient::AXES, &mut slopes());
         }
-        container.put_bytes(TENSOR, self.format.dtype(), &[self.coefficients.len() / COUNT, COUNT, 3], bytes);
         container.put_json(PRESAMPLED_KEY, &self.store().presampled);
         container.put_json(SCALE_KEY, &scale);
-        losses.clamped.insert(TENSOR.to_owned(), clamped);
-        losses.underflowed.insert(TENSOR.to_owned(), underflowed);
     }
 
     /// Reads its tensor; inverse of [`Self::write`] up to rounding. What shading reads has the rounding of its own format.
@@ -282,9 +345,20 @@ impl ShIrradiance {
         if coefficients.iter().any(|c| !c.is_finite()) {
             return Err(format!("tensor '{TENSOR}' holds numbers that are not finite"));
         }
-        let mut read = ShIrradiance::zeros(&ShStore { format, presampled }, probes);
+        let gradient = match container.has(gradient::TENSOR) {
+            true if presampled.is_some() => {
+                return Err(format!(
+                    "metadata '{PRESAMPLED_KEY}' is {presampled:?} beside tensor '{}'",
+                    gradient::TENSOR
+                ));
+            }
+            true => Some(Gradient::read(container, probes, tensor.dtype, scale)?),
+            false => None,
+        };
+        let mut read = ShIrradiance::zeros(&ShStore { format, presampled, gradient: false }, probes);
         read.restore(&coefficients);
         read.round();
+        read.gradient = gradient;
         Ok(read)
     }
 

@@ -58,7 +58,7 @@ impl Row {
         for Lobe { probe, asked, gains } in &self.lobes {
             let probe = *probe as usize;
             let light = match *asked {
-                Asked::Around(oct) => sh.sum(oct, once((probe, 1.0)), |e| e),
+                Asked::Around(oct) => sh.sum(oct, once((probe, 1.0)), |_| Vec3::ZERO, |e| e),
                 Asked::Unknown(j) => sh.unknown(probe, j),
             };
             for c in 0..3 {

@@ -146,7 +146,7 @@ fn harmonics_settle_like_maps() {
         (0.999, Acceleration::Auto),
     ] {
         for presampled in [None, Some(8)] {
-            let mut world = World::with(albedo, IrradianceStore::Sh9(ShStore { format: ColorFormat::F32, presampled }));
+            let mut world = World::with(albedo, IrradianceStore::Sh9(ShStore { presampled, ..ShStore::default() }));
             let (found, solution) = world.irradiance(&bounces(None, acceleration), true);
             assert!(solution.converged, "{solution:?}");
             assert_near(found, PI * (DIRECT + EMITTED) / (1.0 - albedo), albedo);

@@ -155,6 +155,16 @@ impl IrradianceStore {
         }
     }
 
+    /// Why a fit cannot fill it, with the remedy; `None` where it can.
+    pub fn unfit(&self) -> Option<&'static str> {
+        match self {
+            IrradianceStore::Octahedral(store) if store.curve != IrradianceCurve::Linear => {
+                Some("store.irradiance.octahedral.curve must be linear")
+            }
+            IrradianceStore::Octahedral(_) | IrradianceStore::Sh9(_) => None,
+        }
+    }
+
     /// Whether every unknown is irradiance, which is nowhere negative.
     pub fn is_irradiance(&self) -> bool {
         matches!(self, IrradianceStore::Octahedral(_))
@@ -194,7 +204,9 @@ impl IrradianceStore {
             IrradianceStore::Octahedral(store) => {
                 IrradianceStore::Octahedral(OctahedralStore { format: ColorFormat::F32, ..store.clone() })
             }
-            IrradianceStore::Sh9(_) => IrradianceStore::Sh9(ShStore { format: ColorFormat::F32, presampled: None }),
+            IrradianceStore::Sh9(store) => {
+                IrradianceStore::Sh9(ShStore { format: ColorFormat::F32, presampled: None, ..store.clone() })
+            }
         };
         (exact != *self).then_some(exact)
     }

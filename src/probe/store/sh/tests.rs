@@ -10,7 +10,7 @@ use crate::math::octahedral::oct_from_direction;
 use crate::probe::store::{Irradiance, IrradianceStore};
 
 fn store(format: ColorFormat, presampled: Option<usize>) -> IrradianceStore {
-    IrradianceStore::Sh9(ShStore { format, presampled })
+    IrradianceStore::Sh9(ShStore { format, presampled, gradient: false })
 }
 
 /// Two probes: even light of π, and light from one side.
@@ -48,8 +48,9 @@ fn a_look_up_adds_the_functions() {
         }
         // A weighted sum of both.
         let oct = oct_from_direction(Vec3::Y);
-        let sum = irradiance.sum(oct, [(0, 0.25), (1, 0.75)].into_iter(), |e| e);
-        let expected = Vec3::splat(0.25 * PI) + 0.75 * Vec3::from(irradiance.sum(oct, [(1, 1.0)].into_iter(), |e| e));
+        let sum = irradiance.sum(oct, [(0, 0.25), (1, 0.75)].into_iter(), |_| Vec3::ZERO, |e| e);
+        let expected = Vec3::splat(0.25 * PI)
+            + 0.75 * Vec3::from(irradiance.sum(oct, [(1, 1.0)].into_iter(), |_| Vec3::ZERO, |e| e));
         assert!((Vec3::from(sum) - expected).abs().max_element() < 1e-5);
     }
 }
@@ -128,7 +129,7 @@ fn what_shading_reads_is_nowhere_negative() {
     let read = Irradiance::read(&container, 1, 1).unwrap();
     let oct = |i| oct_from_direction(fibonacci::direction(i, 500));
     let least = |of: &Irradiance| {
-        (0..500).map(|i| of.sum(oct(i), [(0, 1.0)].into_iter(), |e| e).x).fold(f32::INFINITY, f32::min)
+        (0..500).map(|i| of.sum(oct(i), [(0, 1.0)].into_iter(), |_| Vec3::ZERO, |e| e).x).fold(f32::INFINITY, f32::min)
     };
     assert!(least(&irradiance) < -0.01 && least(&read) >= 0.0, "{} {}", least(&irradiance), least(&read));
 }

@@ -61,7 +61,7 @@ fn capture(normals: usize) -> ProbeCapture {
 
 /// Largest difference of what the row gives from what the surfaces do, relative to the largest unknown, and the lobes.
 fn difference(presampled: Option<usize>, normals: usize, query: &QuerySettings) -> (f32, Vec<Lobe>) {
-    let volume = volume(IrradianceStore::Sh9(ShStore { format: ColorFormat::F32, presampled }));
+    let volume = volume(IrradianceStore::Sh9(ShStore { format: ColorFormat::F32, presampled, gradient: false }));
     let captures: Vec<ProbeCapture> = (0..PROBES).map(|_| capture(normals)).collect();
     let kernel = volume.irradiance.kernel(&Directions::octahedral(SIDE));
     let operator = Operator { captures: &captures, kernel: &kernel, query, gathers_emission: true };

@@ -1,0 +1,99 @@
+//! The fit: values of the probes that interpolate best.
+//!
+//! The irradiance where a probe stands is not the best value to interpolate: beside a lamp or behind a wall's edge it says
+//! little about the surfaces around. The fit chooses the values by least squares instead, so that the look-up itself gives
+//! the path-traced irradiance at random points (Kavan, Bargteil & Sloan, *Least Squares Vertex Baking*, 2011, do it for
+//! vertices). What a look-up costs, and the layout, stay the same.
+//!
+//! [`points`] chooses where, [`targets`] traces the light there, [`rows`] is the look-up as a sparse matrix, by the query's
+//! own weights, and [`solve`] the solver. The probes then hold no physical light any more.
+
+mod figures;
+pub mod points;
+pub mod rows;
+mod settings;
+pub mod solve;
+mod targets;
+#[cfg(test)]
+mod tests;
+
+use std::time::Instant;
+
+use glam::Vec3A;
+use rayon::prelude::*;
+
+pub use self::figures::FitFigures;
+use self::points::Asked;
+use self::rows::{Row, Rows};
+pub use self::settings::{Fit, RowSettings};
+use crate::light::World;
+use crate::probe::Volume;
+use crate::probe::query::QuerySettings;
+
+/// Fits the volume's irradiance, which the prior is too: unknowns that no row asks for keep their values. `None` where the
+/// settings ask for no fit. `advance` is called with the steps done of [`steps`].
+pub fn run(
+    fit: &Fit,
+    world: &World,
+    query: &QuerySettings,
+    volume: &mut Volume,
+    seed: u64,
+    advance: impl Fn(u64) + Sync,
+) -> Option<FitFigures> {
+    let Fit::Rows(settings) = fit else { return None };
+    let started = Instant::now();
+    let asked = points::all(world, query, volume, settings, seed);
+    let (targets, rays, non_finite) = targets::trace(world, &asked, settings, seed, &advance);
+    let before = figures::residuals(query, volume, &asked, &targets);
+    let lit = targets::without_brightest(&asked, &targets);
+    let counts = |i: usize| asked[i].is_fitted && !asked[i].is_held_out && lit[i];
+    let fitted: Vec<usize> = (0..asked.len()).filter(|&i| counts(i)).collect();
+    let row = |&i: &usize| Row::of(query, volume, &asked[i], targets[i].mean());
+    let rows: Vec<Row> = fitted.par_iter().map(row).collect();
+    let iterations = fit_rows(volume, rows.into_iter(), settings);
+    let after = figures::residuals(query, volume, &asked, &targets);
+    let count = |of: fn(&Asked) -> bool| asked.iter().filter(|a| of(a)).count();
+    Some(FitFigures {
+        rows: fitted.len(),
+        rows_held_out: count(|a| a.is_held_out),
+        rows_dropped: count(|a| !a.is_fitted),
+        paths: settings.paths,
+        iterations,
+        held_out_before: before.surface,
+        held_out_after: after.surface,
+        air_before: before.air,
+        air_after: after.air,
+        negative_share: after.negative,
+        non_finite,
+        rays,
+        time_s: started.elapsed().as_secs_f64(),
+    })
+}
+
+/// Fits a volume to rows. Returns the iterations of the solver.
+pub fn fit_rows(volume: &mut Volume, rows: impl Iterator<Item = Row>, settings: &RowSettings) -> u32 {
+    /// Times that unknowns below 0 are held there and the others solved for again.
+    const ROUNDS: u32 = 3;
+    let factors = volume.irradiance.factors();
+    let unknowns = volume.irradiance.fitted_unknowns();
+    let rows = Rows::new(&factors, volume.states.len(), unknowns, rows);
+    let prior: Vec<Vec3A> = (0..volume.states.len()).flat_map(|p| volume.irradiance.fitted(p)).collect();
+    let lambda = f64::from(settings.lambda) * factors.stiffness();
+    let task = solve::Task { rows: &rows, prior: &prior, lambda, iterations: settings.iterations };
+    // Irradiance is nowhere negative; coefficients have signs.
+    let bounded = volume.irradiance.signed().is_none();
+    let solved = task.solve(if bounded { ROUNDS } else { 0 });
+    let asked = rows.asked();
+    for (p, values) in solved.values.chunks(unknowns).enumerate().filter(|(p, _)| asked[*p]) {
+        volume.irradiance.set_fitted(p, values);
+    }
+    solved.iterations
+}
+
+/// Steps of a run that `advance` counts.
+pub fn steps(fit: &Fit, active: usize) -> usize {
+    match fit {
+        Fit::None => 0,
+        Fit::Rows(settings) => settings.points(active).iter().sum(),
+    }
+}

@@ -1,0 +1,139 @@
+//! The look-up as a sparse matrix, one row a point: a share for each probe that the point asks, and of each probe the
+//! factors of [`Factors`], which are made anew where they are needed.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::points::Asked;
+use crate::probe::Volume;
+use crate::probe::query::{Part, Query, QuerySettings};
+use crate::probe::store::irradiance::Factors;
+
+/// One point's look-up, what it should give and how much that counts.
+#[derive(Debug, Clone)]
+pub struct Row {
+    pub parts: Vec<Part>,
+    /// W·m⁻².
+    pub target: Vec3,
+    pub weight: f32,
+}
+
+impl Row {
+    /// Most bytes that one takes: eight parts, twice while they are collected, their lists by probe, and what is known of the point.
+    pub const BYTES: u64 = (8 * (2 * size_of::<Part>() + 2 * size_of::<u32>()) + size_of::<Row>() + 256) as u64;
+
+    /// The row of a point. It has no parts where the point finds no probe.
+    pub fn of(query: &QuerySettings, volume: &Volume, asked: &Asked, target: Vec3) -> Row {
+        let query = Query { volume, settings: query };
+        let weights = query.weights(&asked.query, asked.visibility);
+        let parts = if weights.total() > 0.0 { query.parts(&weights, &asked.query) } else { Vec::new() };
+        Row { parts, target, weight: asked.weight }
+    }
+}
+
+/// All rows. Unknowns are numbered probe by probe.
+pub struct Rows<'f, 'i> {
+    factors: &'f Factors<'i>,
+    unknowns: usize,
+    /// Parts of row k: `start[k]..start[k + 1]`.
+    start: Vec<u32>,
+    parts: Vec<Part>,
+    targets: Vec<Vec3>,
+    weights: Vec<f32>,
+    /// Parts of probe p with their rows: `of_probe[probe_start[p]..probe_start[p + 1]]`, in the order of the rows.
+    probe_start: Vec<u32>,
+    of_probe: Vec<(u32, u32)>,
+}
+
+/// Rows and probes that a thread takes at once.
+const CHUNK: usize = 64;
+
+impl<'f, 'i> Rows<'f, 'i> {
+    pub fn new(factors: &'f Factors<'i>, probes: usize, unknowns: usize, rows: impl Iterator<Item = Row>) -> Self {
+        let (mut start, mut parts) = (vec![0], Vec::new());
+        let (mut targets, mut weights) = (Vec::new(), Vec::new());
+        for row in rows {
+            parts.extend(row.parts);
+            start.push(parts.len() as u32);
+            targets.push(row.target);
+            weights.push(row.weight);
+        }
+        let mut probe_start = vec![0u32; probes + 1];
+        parts.iter().for_each(|part| probe_start[part.probe.0 as usize + 1] += 1);
+        (0..probes).for_each(|p| probe_start[p + 1] += probe_start[p]);
+        let mut next = probe_start.clone();
+        let mut of_probe = vec![(0, 0); parts.len()];
+        for row in 0..targets.len() {
+            for i in start[row]..start[row + 1] {
+                let next = &mut next[parts[i as usize].probe.0 as usize];
+                of_probe[*next as usize] = (i, row as u32);
+                *next += 1;
+            }
+        }
+        Rows { factors, unknowns, start, parts, targets, weights, probe_start, of_probe }
+    }
+
+    /// Which probes any row asks.
+    pub fn asked(&self) -> Vec<bool> {
+        self.probe_start.windows(2).map(|w| w[0] < w[1]).collect()
+    }
+
+    /// Numbers of all unknowns, asked for or not.
+    pub fn columns(&self) -> usize {
+        (self.probe_start.len() - 1) * self.unknowns
+    }
+
+    pub fn weights(&self) -> &[f32] {
+        &self.weights
+    }
+
+    pub fn targets(&self) -> &[Vec3] {
+        &self.targets
+    }
+
+    /// What the look-ups give: A·x.
+    pub fn times(&self, x: &[DVec3]) -> Vec<DVec3> {
+        let row = |row: usize| {
+            let parts = &self.parts[self.start[row] as usize..self.start[row + 1] as usize];
+            let of_part = |part: &Part| {
+                let own = &x[part.probe.0 as usize * self.unknowns..][..self.unknowns];
+                let mut sum = DVec3::ZERO;
+                self.factors.each(part.oct, part.offset, |unknown, factor| sum += own[unknown] * f64::from(factor));
+                sum * f64::from(part.share)
+            };
+            parts.iter().map(of_part).sum()
+        };
+        (0..self.targets.len()).into_par_iter().with_min_len(CHUNK).map(row).collect()
+    }
+
+    /// Aᵀ·W·y, W the weights of the rows: each unknown adds up its rows in their order, so that threads make no difference.
+    pub fn transposed_times(&self, y: &[DVec3]) -> Vec<DVec3> {
+        let mut out = vec![DVec3::ZERO; self.columns()];
+        out.par_chunks_mut(self.unknowns).enumerate().for_each(|(p, own)| {
+            for &(part, row) in self.parts_of(p) {
+                let part = &self.parts[part as usize];
+                let value = y[row as usize] * f64::from(part.share * self.weights[row as usize]);
+                self.factors.each(part.oct, part.offset, |unknown, factor| own[unknown] += value * f64::from(factor));
+            }
+        });
+        out
+    }
+
+    /// About the diagonal of Aᵀ·W·A: factors that a row has twice for the same unknown are squared one by one.
+    pub fn diagonal(&self) -> Vec<f64> {
+        let mut out = vec![0.0; self.columns()];
+        out.par_chunks_mut(self.unknowns).enumerate().for_each(|(p, own)| {
+            for &(part, row) in self.parts_of(p) {
+                let part = &self.parts[part as usize];
+                self.factors.each(part.oct, part.offset, |unknown, factor| {
+                    own[unknown] += f64::from(self.weights[row as usize]) * f64::from(factor * part.share).powi(2);
+                });
+            }
+        });
+        out
+    }
+
+    fn parts_of(&self, probe: usize) -> &[(u32, u32)] {
+        &self.of_probe[self.probe_start[probe] as usize..self.probe_start[probe + 1] as usize]
+    }
+}

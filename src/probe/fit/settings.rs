@@ -1,0 +1,99 @@
+//! What a method says about fitting its probes.
+
+use serde::{Deserialize, Serialize};
+
+use super::rows::Row;
+use crate::probe::query::QuerySettings;
+use crate::probe::store::IrradianceStore;
+
+/// Which values probes get in place of those that light has where they stand.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fit {
+    /// They keep them.
+    #[default]
+    None,
+    /// Those by which look-ups come nearest to path-traced light at points of surfaces and of the air.
+    Rows(RowSettings),
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RowSettings {
+    /// Points on surfaces for each active probe; half as many more with bent normals, and half as many in the air.
+    pub rows_per_probe: u32,
+    /// Paths from each point. With 4: 1.05 to 1.5 × the error, most in the dark.
+    pub paths: u32,
+    /// Weight of a row with a bent normal, beside 1 of the surface's own; 0: there are none.
+    pub bent: f32,
+    /// Weight of a row in the air; 0: there are none.
+    pub air: f32,
+    /// How much a squared difference of values from those before the fit counts beside one of a row. With 0.3: 1.17 to 1.25 ×
+    /// the error in pictures of two_rooms_open, thin_wall and cornell, with 0.01 as much as with 0.03.
+    pub lambda: f32,
+    /// Most iterations of the solver.
+    pub iterations: u32,
+}
+
+impl Default for RowSettings {
+    fn default() -> Self {
+        RowSettings { rows_per_probe: 100, paths: 16, bent: 0.5, air: 0.3, lambda: 0.03, iterations: 40 }
+    }
+}
+
+impl RowSettings {
+    /// Points that are looked for: on surfaces, there with bent normals, in the air.
+    pub fn points(&self, active: usize) -> [usize; 3] {
+        let all = self.rows_per_probe as usize * active;
+        let half = |weight: f32| if weight > 0.0 { all / 2 } else { 0 };
+        [all, half(self.bent), half(self.air)]
+    }
+
+    /// Calls `rule(key, value, holds, rule)` for every number in it.
+    fn check(&self, rule: &mut dyn FnMut(&'static str, String, bool, &'static str)) {
+        let count = "use 1 to 65536";
+        for (key, value) in [
+            ("fit.rows.rows_per_probe", self.rows_per_probe),
+            ("fit.rows.paths", self.paths),
+            ("fit.rows.iterations", self.iterations),
+        ] {
+            rule(key, value.to_string(), (1..=65_536).contains(&value), count);
+        }
+        for (key, value) in [("fit.rows.bent", self.bent), ("fit.rows.air", self.air)] {
+            rule(key, value.to_string(), (0.0..=1e3).contains(&value), "use a number from 0 to 1000");
+        }
+        let holds = (1e-6..=1e9).contains(&self.lambda);
+        rule("fit.rows.lambda", self.lambda.to_string(), holds, "use a number from 1e-6 to 1e9");
+    }
+}
+
+impl Fit {
+    pub fn is_none(&self) -> bool {
+        *self == Fit::None
+    }
+
+    /// Why these look-ups cannot be fitted, with the remedy; `None` where they can. Least squares need sums: means of roots
+    /// and curves are none.
+    pub fn mismatch(&self, query: &QuerySettings, store: &IrradianceStore) -> Option<String> {
+        if self.is_none() {
+            return None;
+        }
+        let what = if query.is_linear() { store.unfit() } else { Some("query.blend must be linear") };
+        what.map(|what| format!("fit is rows: {what}; or set fit to none"))
+    }
+
+    /// Calls `rule(key, value, holds, rule)` for every number in it.
+    pub fn check(&self, rule: &mut dyn FnMut(&'static str, String, bool, &'static str)) {
+        match self {
+            Fit::None => {}
+            Fit::Rows(settings) => settings.check(rule),
+        }
+    }
+
+    /// Memory of rows and solver for so many active probes of so many unknowns.
+    pub fn bytes(&self, active: u64, unknowns: u64) -> u64 {
+        let Fit::Rows(settings) = self else { return 0 };
+        let points = 2 * u64::from(settings.rows_per_probe) * active;
+        points * Row::BYTES + super::solve::bytes(active * unknowns)
+    }
+}

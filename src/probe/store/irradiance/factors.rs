@@ -1,0 +1,102 @@
+//! Irradiance as the linear function of a probe's numbers that a look-up makes of it: what a fit works on.
+
+use glam::{Vec2, Vec3, Vec3A};
+
+use super::Irradiance;
+use crate::math::harmonics::{self, COUNT, Y0};
+use crate::math::octahedral::direction_from_oct;
+use crate::probe::store::map::{OctahedralMaps, fill_with_border};
+use crate::probe::store::sh::Functions;
+
+/// By which factors a probe's unknowns add up to its irradiance around a direction.
+pub struct Factors<'i>(Kind<'i>);
+
+enum Kind<'i> {
+    /// Four texels of a map; `interior`: which texel within the border each of all stands for.
+    Maps { maps: &'i OctahedralMaps<Vec3A>, interior: Vec<u32> },
+    /// Functions ÷ Y₀, and with a gradient the way from the probe.
+    Functions { gradient: bool },
+    /// Functions at the four texels of a map that shading reads.
+    Presampled { maps: &'i OctahedralMaps<Vec3A>, functions: Vec<Functions> },
+}
+
+impl Factors<'_> {
+    /// Calls `add(unknown, factor)` for all unknowns that count around `oct`, for a point that is `offset` from the probe, in
+    /// its spacings. Irradiance is their sum where the store is linear.
+    #[inline]
+    pub fn each(&self, oct: Vec2, offset: Vec3, mut add: impl FnMut(usize, f32)) {
+        match &self.0 {
+            Kind::Maps { maps, interior } => {
+                let taps = maps.taps(oct);
+                for (texel, weight) in taps.offset.iter().zip(taps.weight) {
+                    add(interior[*texel as usize] as usize, weight);
+                }
+            }
+            Kind::Functions { gradient } => {
+                for (unknown, y) in harmonics::basis(direction_from_oct(oct)).iter().enumerate() {
+                    add(unknown, y / Y0);
+                }
+                if *gradient {
+                    (0..3).for_each(|axis| add(COUNT + axis, offset[axis]));
+                }
+            }
+            Kind::Presampled { maps, functions } => {
+                let taps = maps.taps(oct);
+                for unknown in 0..COUNT {
+                    let tap = |i: usize| functions[taps.offset[i] as usize].0[unknown] * taps.weight[i];
+                    add(unknown, (0..4).map(tap).sum::<f32>() / Y0);
+                }
+            }
+        }
+    }
+
+    /// How many squares of a difference of unknowns, W·m⁻², a squared difference of what the file holds is.
+    pub fn stiffness(&self) -> f64 {
+        match self.0 {
+            Kind::Maps { .. } => 1.0,
+            Kind::Functions { .. } | Kind::Presampled { .. } => f64::from(Y0).powi(-2),
+        }
+    }
+}
+
+impl Irradiance {
+    /// Irradiance as a function of the unknowns of a fit.
+    pub fn factors(&self) -> Factors<'_> {
+        Factors(match self {
+            Irradiance::Maps { maps, .. } => {
+                let own: Vec<u32> = (0..self.unknowns() as u32).collect();
+                let mut interior = vec![0; maps.texels_per_probe()];
+                fill_with_border(&own, maps.resolution, maps.border, &mut interior);
+                Kind::Maps { maps, interior }
+            }
+            Irradiance::Sh9(sh) => match sh.presampled() {
+                Some((maps, functions)) => Kind::Presampled { maps, functions },
+                None => Kind::Functions { gradient: sh.store().gradient },
+            },
+        })
+    }
+
+    /// Unknowns of a fit of one probe: those of the solver, and the gradient where there is one.
+    pub fn fitted_unknowns(&self) -> usize {
+        match self {
+            Irradiance::Maps { .. } => self.unknowns(),
+            Irradiance::Sh9(sh) => sh.fitted_unknowns(),
+        }
+    }
+
+    /// These of a probe, W·m⁻².
+    pub fn fitted(&self, probe: usize) -> Vec<Vec3A> {
+        match self {
+            Irradiance::Maps { .. } => self.probe(probe).map(Vec3A::from).collect(),
+            Irradiance::Sh9(sh) => sh.fitted(probe),
+        }
+    }
+
+    /// Sets them.
+    pub fn set_fitted(&mut self, probe: usize, values: &[Vec3A]) {
+        match self {
+            Irradiance::Maps { .. } => self.set_probe(probe, values),
+            Irradiance::Sh9(sh) => sh.set_fitted(probe, values),
+        }
+    }
+}

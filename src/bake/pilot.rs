@@ -6,17 +6,23 @@ use super::circumstances::Circumstances;
 use super::gather::gather;
 use super::log::Log;
 use super::prepared::Prepared;
+use crate::light::sampled::RayCount;
 use crate::math::random::Purpose;
 use crate::probe::capture::guide::{Guide, Pilot};
-use crate::probe::capture::{Capture, CaptureSettings};
+use crate::probe::capture::{Capture, CaptureSettings, ProbeCapture};
 use crate::probe::lattice::ProbeState;
 use crate::probe::store::Occlusion;
 use crate::probe::transport::operator::{Captures, Operator, store};
 use crate::probe::{ProbeIndex, Volume};
 use crate::system::progress::Progress;
 
+/// A probe that is to get so many rays a texel in the mean is looked at a second time with these rays before they count: its
+/// pilot has seen that it sees something small, and little of what that is. In office at 2 m (seven of forty lit probes see
+/// light through slits only) the deviation of probes falls from 3.4 to 2.4 % (24² texels, 2 guided rays).
+const UNSURE: f32 = 8.0;
+
 impl Prepared<'_, '_> {
-    /// Where guided rays go; `None` where no rays are guided.
+    /// Where guided rays go; `None` where there are none.
     pub(super) fn pilot(&self, circumstances: &Circumstances, log: &mut Log) -> Option<Guide> {
         let (side, per_texel, guided) = self.capture.rays.guided()?;
         let bounces = self.config.transport.rough_bounces();
@@ -30,41 +36,56 @@ impl Prepared<'_, '_> {
         let mut own = Log::new(Progress::hidden());
         let (captures, occlusion) = gather(self, &capture, circumstances, &mut own);
         let mut volume = self.volume(if self.plan.visibility { occlusion } else { Occlusion::None });
-        let solve = || {
-            let kernel = self.kernel(&volume);
-            let operator = Operator {
-                captures: &captures,
-                kernel: &kernel,
-                query: &self.config.query,
-                gathers_emission: self.config.capture.gathers_emission(),
-            };
-            let direct = operator.apply(&volume, None).0;
-            store(&mut volume, &direct);
-            let masks = operator.masks(&volume);
-            for _ in 1..bounces {
-                let next = operator.apply(&volume, Some(&masks)).0;
-                store(&mut volume, &next);
-            }
-            self.pilots(&operator, &volume, side)
+        let kernel = self.kernel(&volume);
+        let operator = Operator {
+            captures: &captures,
+            kernel: &kernel,
+            query: &self.config.query,
+            gathers_emission: self.config.capture.gathers_emission(),
         };
-        let pilots = log.time(|times| &mut times.bounces, solve);
-        log.times.capture += own.times.capture;
-        log.rays.primary += own.rays.primary;
-        log.rays.shadow += own.rays.shadow;
-        Some(Guide::new(pilots, &self.placement.asked, per_texel, guided, circumstances.seed))
-    }
-
-    /// What every active probe's texels hold, with what numbers the probe's random sequences.
-    fn pilots<C: Captures>(&self, operator: &Operator<C>, volume: &Volume, side: usize) -> Vec<Option<(usize, Pilot)>> {
+        own.time(|times| &mut times.bounces, || solve_roughly(&operator, bounces, &mut volume));
         let solid_angles: Vec<f32> =
             self.capture.rays.directions().texel_means().into_iter().map(|(_, angle)| angle).collect();
-        let of_probe = |p: usize| {
-            (self.placement.states[p] == ProbeState::Active).then(|| {
-                let radiance =
-                    operator.captures.with(p, |capture| operator.outgoing(volume, p, capture, |_| Some(0), true).0);
-                (self.grid.stream(ProbeIndex(p as u32)) as usize, Pilot::new(&radiance, &solid_angles, side))
-            })
+        let read = |p: usize, capture: &ProbeCapture| {
+            let radiance = operator.outgoing(&volume, p, capture, |_| Some(0), true).0;
+            (self.grid.stream(ProbeIndex(p as u32)) as usize, Pilot::new(&radiance, &solid_angles, side))
         };
-        (0..self.grid.probe_count()).into_par_iter().map(of_probe).collect()
+        let is_active = |p: usize| self.placement.states[p] == ProbeState::Active;
+        let read_all = || {
+            let of_probe = |p: usize| is_active(p).then(|| captures.with(p, |capture| read(p, capture)));
+            (0..self.grid.probe_count()).into_par_iter().map(of_probe).collect::<Vec<_>>()
+        };
+        let mut pilots = own.time(|times| &mut times.bounces, read_all);
+        let guide = |pilots: &[_]| Guide::new(pilots, &self.placement.asked, per_texel, guided, circumstances.seed);
+        let first = guide(&pilots);
+        let unsure: Vec<usize> = (0..pilots.len()).filter(|&p| first.mean(p) >= UNSURE * per_texel as f32).collect();
+        let again = Capture { guide: Some(&first), purpose: Purpose::SecondPilot, ..capture };
+        let look_again = |&p: &usize| {
+            let capture = self.trace(&again, p);
+            (p, read(p, &capture), capture.rays)
+        };
+        let second: Vec<(usize, (usize, Pilot), RayCount)> =
+            own.time(|times| &mut times.capture, || unsure.par_iter().map(look_again).collect());
+        for (p, pilot, rays) in second {
+            pilots[p] = Some(pilot);
+            own.rays.primary += rays.primary;
+            own.rays.shadow += rays.shadow;
+        }
+        log.times.capture += own.times.capture;
+        log.times.bounces += own.times.bounces;
+        log.rays.primary += own.rays.primary;
+        log.rays.shadow += own.rays.shadow;
+        Some(guide(&pilots))
+    }
+}
+
+/// A few plain bounces.
+fn solve_roughly<C: Captures>(operator: &Operator<C>, bounces: u32, volume: &mut Volume) {
+    let direct = operator.apply(volume, None).0;
+    store(volume, &direct);
+    let masks = operator.masks(volume);
+    for _ in 1..bounces {
+        let next = operator.apply(volume, Some(&masks)).0;
+        store(volume, &next);
     }
 }

@@ -12,6 +12,8 @@ pub enum Purpose {
     Capture = 1,
     /// The same for the captures that guide others.
     Pilot = 10,
+    /// The same again where the first of these are unsure.
+    SecondPilot = 11,
     /// Light samples at probe centres.
     ProbeEmission = 2,
     /// Rays through a pixel, which translucent surfaces stop by chance.

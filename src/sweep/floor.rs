@@ -148,7 +148,7 @@ mod tests {
     fn every_variant_differs_in_its_cause_only() {
         let config = Config::default();
         let [angular, bounces, encoding] = variants(&config).map(|variant| variant.config.unwrap());
-        assert_eq!((angular.store.irradiance.unknowns(), angular.capture.rays.texels()), (16 * 16, 48 * 48));
+        assert_eq!((angular.store.irradiance.unknowns(), angular.capture.rays.texels()), (16 * 16, 64 * 64));
         assert_eq!(Config { store: config.store.clone(), capture: config.capture.clone(), ..angular }, config);
         assert!(bounces.transport != config.transport);
         assert_eq!(Config { transport: config.transport.clone(), ..bounces }, config);

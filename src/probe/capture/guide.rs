@@ -61,7 +61,7 @@ pub struct Guide(Vec<Option<Box<[u16]>>>);
 impl Guide {
     /// `per_texel` rays each, and `guided` more in the mean over all probes that are `asked`; what the others get changes
     /// nothing for these. `pilots` by probe, with what numbers its random sequences.
-    pub fn new(pilots: Vec<Option<(usize, Pilot)>>, asked: &[bool], per_texel: usize, guided: f32, seed: u64) -> Guide {
+    pub fn new(pilots: &[Option<(usize, Pilot)>], asked: &[bool], per_texel: usize, guided: f32, seed: u64) -> Guide {
         let counted = || pilots.iter().zip(asked).filter(|(_, asked)| **asked).filter_map(|(p, _)| p.as_ref());
         let count = counted().count().max(1) as f64;
         let floor = DARKEST * counted().map(|(_, pilot)| pilot.light).sum::<f64>() / count;
@@ -70,21 +70,29 @@ impl Guide {
             if pilot.deviation > 0.0 && pilot.deviation.is_finite() { pilot.deviation / light } else { 0.0 }
         };
         let mean = counted().map(|(_, pilot)| relative(pilot)).sum::<f64>() / count;
-        let counts = |(stream, pilot): (usize, Pilot)| {
-            let share = relative(&pilot) / mean;
+        let counts = |(stream, pilot): &(usize, Pilot)| {
+            let share = relative(pilot) / mean;
             let rays =
                 if share > 0.0 { (f64::from(guided) * share).min(MOST) * pilot.deviations.len() as f64 } else { 0.0 };
             let even = EVEN * rays / pilot.deviations.len() as f64;
             let per_deviation = (1.0 - EVEN) * rays / pilot.deviations.iter().map(|&d| f64::from(d)).sum::<f64>();
-            let mut random = Random::new(seed, Purpose::Pilot, stream as u64, 1);
-            let count = |deviation: f32| {
+            let mut random = Random::new(seed, Purpose::Pilot, *stream as u64, 1);
+            let count = |&deviation: &f32| {
                 let wanted = if rays > 0.0 { even + per_deviation * f64::from(deviation) } else { 0.0 };
                 // Rounded by chance; `as` saturates.
                 (per_texel as f64 + wanted + f64::from(random.uniform())) as u16
             };
-            pilot.deviations.into_iter().map(count).collect()
+            pilot.deviations.iter().map(count).collect()
         };
-        Guide(pilots.into_iter().map(|pilot| pilot.map(counts)).collect())
+        Guide(pilots.iter().map(|pilot| pilot.as_ref().map(counts)).collect())
+    }
+
+    /// Rays per texel that a probe gets, in the mean over its texels; 0 where there are none.
+    pub fn mean(&self, probe: usize) -> f32 {
+        self.of(probe).map_or(0.0, |counts| {
+            let sum: u64 = counts.iter().map(|&n| u64::from(n)).sum();
+            sum as f32 / counts.len() as f32
+        })
     }
 
     /// Rays through the texels of a probe.
@@ -110,7 +118,7 @@ mod tests {
 
     #[test]
     fn rays_go_where_light_differs() {
-        let guide = Guide::new(pilots(), &[true; 2], 2, 3.0, 1);
+        let guide = Guide::new(&pilots(), &[true; 2], 2, 3.0, 1);
         let total = |probe| guide.of(probe).unwrap().iter().map(|&n| u32::from(n)).sum::<u32>();
         // All further rays of both go to the first; rounding by chance leaves ±√(64/12).
         let texels = (SIDE * SIDE) as u32;
@@ -127,9 +135,9 @@ mod tests {
 
     #[test]
     fn probes_that_nobody_asks_take_no_rays_from_others() {
-        let alone = Guide::new(pilots(), &[true, false], 1, 1.0, 1);
-        let with_a_third = pilots().into_iter().chain(pilots().into_iter().take(1)).collect();
-        let both = Guide::new(with_a_third, &[true, false, false], 1, 1.0, 1);
+        let alone = Guide::new(&pilots(), &[true, false], 1, 1.0, 1);
+        let with_a_third: Vec<_> = pilots().into_iter().chain(pilots().into_iter().take(1)).collect();
+        let both = Guide::new(&with_a_third, &[true, false, false], 1, 1.0, 1);
         assert_eq!(alone.of(0), both.of(0));
     }
 
@@ -140,7 +148,7 @@ mod tests {
             let mut radiance = [Vec3A::splat(light); SIDE * SIDE];
             radiance[3] = Vec3A::ZERO;
             let pilots = vec![Some((0, Pilot::new(&radiance, &angles, SIDE))), None];
-            let guide = Guide::new(pilots, &[true, true], 1, 1.0, 1);
+            let guide = Guide::new(&pilots, &[true, true], 1, 1.0, 1);
             assert!(guide.of(0).unwrap().iter().all(|&n| n >= 1), "{light}");
             assert!(guide.of(1).is_none());
         }

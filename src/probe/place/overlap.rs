@@ -6,16 +6,23 @@ use glam::Vec3;
 
 /// Whether a triangle meets the box around the origin with these half sides.
 pub fn triangle_meets_box(corners: [Vec3; 3], half: Vec3) -> bool {
+    // What most boxes fail by comes first: the triangle's own box, then its plane.
+    let low = corners[0].min(corners[1]).min(corners[2]);
+    let high = corners[0].max(corners[1]).max(corners[2]);
+    if low.cmpgt(half).any() || high.cmplt(-half).any() {
+        return false;
+    }
     let edges = [corners[1] - corners[0], corners[2] - corners[1], corners[0] - corners[2]];
+    let normal = edges[0].cross(edges[1]);
+    if normal.dot(corners[0]).abs() > half.dot(normal.abs()) {
+        return false;
+    }
     let separated = |axis: Vec3| {
         let p = corners.map(|c| c.dot(axis));
         let (low, high) = (p[0].min(p[1]).min(p[2]), p[0].max(p[1]).max(p[2]));
         let reach = half.dot(axis.abs());
         low > reach || high < -reach
     };
-    if Vec3::AXES.into_iter().any(separated) || separated(edges[0].cross(edges[1])) {
-        return false;
-    }
     !Vec3::AXES.into_iter().any(|axis| edges.iter().any(|edge| separated(axis.cross(*edge))))
 }
 

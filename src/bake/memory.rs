@@ -6,6 +6,7 @@ use crate::config::Config;
 use crate::probe::Grid;
 use crate::probe::capture::surfel::{PackedNormal, Surfel};
 use crate::probe::capture::{ProbeCapture, Seen};
+use crate::probe::fit;
 use crate::probe::place::survey;
 use crate::probe::store::radiance::LightFieldStore;
 use crate::probe::transport::anderson::History;
@@ -60,7 +61,7 @@ impl Memory {
             kernels: store.irradiance.filter_bytes(texels) + distance_kernel + resampling,
             maps: probes * per_probe + history,
             in_flight: (surfels_bytes(config) + distances + resampled) * rayon::current_num_threads() as u64,
-            fit: config.fit.bytes(probes, unknowns as u64),
+            fit: fit::bytes(&config.fit, probes, unknowns as u64),
         }
     }
 

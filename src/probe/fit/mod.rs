@@ -90,6 +90,17 @@ pub fn fit_rows(volume: &mut Volume, rows: impl Iterator<Item = Row>, settings: 
     solved.iterations
 }
 
+/// Memory of rows and solver for so many active probes of so many unknowns.
+pub fn bytes(fit: &Fit, active: u64, unknowns: u64) -> u64 {
+    match fit {
+        Fit::None => 0,
+        Fit::Rows(settings) => {
+            let points = 2 * u64::from(settings.rows_per_probe) * active;
+            points * Row::BYTES + solve::bytes(active * unknowns)
+        }
+    }
+}
+
 /// Steps of a run that `advance` counts.
 pub fn steps(fit: &Fit, active: usize) -> usize {
     match fit {

@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::rows::Row;
 use crate::probe::query::QuerySettings;
 use crate::probe::store::IrradianceStore;
 
@@ -88,12 +87,5 @@ impl Fit {
             Fit::None => {}
             Fit::Rows(settings) => settings.check(rule),
         }
-    }
-
-    /// Memory of rows and solver for so many active probes of so many unknowns.
-    pub fn bytes(&self, active: u64, unknowns: u64) -> u64 {
-        let Fit::Rows(settings) = self else { return 0 };
-        let points = 2 * u64::from(settings.rows_per_probe) * active;
-        points * Row::BYTES + super::solve::bytes(active * unknowns)
     }
 }

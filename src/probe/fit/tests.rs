@@ -222,8 +222,8 @@ fn conjugate_gradients_reach_the_dense_solution() {
         assert!((0.5..1.0 + 1e-6).contains(&(diagonal / exact)), "{diagonal} {exact}");
     }
     let cholesky = matrix.cholesky().unwrap();
-    for c in 0..3 {
-        let exact = cholesky.solve(&right[c]);
+    for (c, right) in right.iter().enumerate() {
+        let exact = cholesky.solve(right);
         let largest = exact.amax();
         for i in 0..unknowns {
             let off = (f64::from(solved.values[i][c]) - exact[i]).abs() / largest;

@@ -67,12 +67,17 @@ impl CornerTest for MomentsTest<'_> {
 pub struct SurfaceTest<'v> {
     pub table: &'v SurfaceVisibility,
     pub test: TableTest,
+    /// Whether there is an answer also where the table knows none.
+    pub everywhere: bool,
 }
 
 impl CornerTest for SurfaceTest<'_> {
     #[inline]
     fn seen(&self, grid: &Grid, cell: &Cell, point: &QueryPoint, biased: Vec3) -> Seen {
-        self.table.look_up(grid, cell, biased, point.facing, &self.test)
+        match self.everywhere {
+            false => self.table.look_up(grid, cell, biased, point.facing, &self.test),
+            true => self.table.everywhere(grid, cell, biased, point.facing, &self.test),
+        }
     }
 
     #[inline]

@@ -42,7 +42,10 @@ impl<'v> Query<'v> {
                     occlusion.moments().map(moments).or_else(|| occlusion.tiles().map(tiles))
                 }
                 VisibilityTest::Table(test) => {
-                    occlusion.surface().map(|table| Test::Surface(SurfaceTest { table, test }))
+                    occlusion.surface().map(|table| Test::Surface(SurfaceTest { table, test, everywhere: false }))
+                }
+                VisibilityTest::Everywhere(test) => {
+                    occlusion.surface().map(|table| Test::Surface(SurfaceTest { table, test, everywhere: true }))
                 }
             },
         };
@@ -94,7 +97,8 @@ impl<'v> Query<'v> {
     pub fn stored_mask(&self, point: &QueryPoint) -> u8 {
         let Test::Surface(test) = self.test(Visibility::Stored) else { return 0 };
         let biased = self.biased(point);
-        test.seen(&self.volume.grid, &self.cell_of(point, biased), point, biased).mask
+        let seen = test.seen(&self.volume.grid, &self.cell_of(point, biased), point, biased);
+        if seen.far.is_none() { seen.mask } else { 0 }
     }
 
     #[inline]

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::probe::lattice::Grid;
 use crate::probe::store::OcclusionStore;
-use crate::probe::store::surface::TableTest;
+use crate::probe::store::surface::{MAX_VOXELS_PER_CELL, TableTest};
 
 /// A method's weights: the factors multiply in the order of these fields.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -112,6 +112,9 @@ pub enum VisibilityTest {
     Chebyshev { power: f32, floor: f32 },
     /// The table of visibility at surfaces.
     Table(TableTest),
+    /// The same, but where it knows nothing, what the nearest surface sees that faces the point, and without one all: so
+    /// things that the bake did not know are lit, and the air is.
+    Everywhere(TableTest),
 }
 
 impl Default for VisibilityTest {
@@ -208,21 +211,27 @@ impl QuerySettings {
                 let holds = power.is_finite() && power >= 0.0;
                 rule("query.test.chebyshev.power", power.to_string(), holds, "use a finite number, not negative");
             }
-            VisibilityTest::Table(TableTest { reach_voxels, strip }) => {
-                unit("query.test.table.strip", strip);
-                rule("query.test.table.reach_voxels", reach_voxels.to_string(), reach_voxels <= 22, "use 0 to 22");
+            VisibilityTest::Table(table) => {
+                unit("query.test.table.strip", table.strip);
+                let holds = table.reach_voxels <= MAX_VOXELS_PER_CELL;
+                rule("query.test.table.reach_voxels", table.reach_voxels.to_string(), holds, "use 0 to 22");
+            }
+            VisibilityTest::Everywhere(table) => {
+                unit("query.test.everywhere.strip", table.strip);
+                let holds = table.reach_voxels <= MAX_VOXELS_PER_CELL;
+                rule("query.test.everywhere.reach_voxels", table.reach_voxels.to_string(), holds, "use 0 to 22");
             }
         }
     }
 }
 
 impl VisibilityTest {
-    /// Name in configurations.
+    /// Name in configurations of the test of what is stored that it makes.
     pub fn name(&self) -> &'static str {
         match self {
             VisibilityTest::None => "none",
             VisibilityTest::Chebyshev { .. } => "chebyshev",
-            VisibilityTest::Table(_) => "table",
+            VisibilityTest::Table(_) | VisibilityTest::Everywhere(_) => "table",
         }
     }
 }

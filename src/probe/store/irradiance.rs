@@ -223,6 +223,38 @@ impl Irradiance {
         }
     }
 
+    /// Irradiance as a function of the unknowns of a fit.
+    pub fn factors(&self) -> Factors<'_> {
+        match self {
+            Irradiance::Maps { maps, .. } => Factors::of_maps(maps),
+            Irradiance::Sh9(sh) => Factors::of_harmonics(sh),
+        }
+    }
+
+    /// Unknowns of a fit of one probe: those of the solver, and the gradient where there is one.
+    pub fn fitted_unknowns(&self) -> usize {
+        match self {
+            Irradiance::Maps { .. } => self.unknowns(),
+            Irradiance::Sh9(sh) => sh.fitted_unknowns(),
+        }
+    }
+
+    /// These of a probe, W·m⁻².
+    pub fn fitted(&self, probe: usize) -> Vec<Vec3A> {
+        match self {
+            Irradiance::Maps { .. } => self.probe(probe).map(Vec3A::from).collect(),
+            Irradiance::Sh9(sh) => sh.fitted(probe),
+        }
+    }
+
+    /// Sets them.
+    pub fn set_fitted(&mut self, probe: usize, values: &[Vec3A]) {
+        match self {
+            Irradiance::Maps { .. } => self.set_probe(probe, values),
+            Irradiance::Sh9(sh) => sh.set_fitted(probe, values),
+        }
+    }
+
     /// That of some probes, in this order.
     pub fn of_probes(&self, probes: &[usize]) -> Irradiance {
         match self {

@@ -141,6 +141,29 @@ impl SurfaceVisibility {
             .unwrap_or(0)
     }
 
+    /// What any point of a cell sees, roughly where the survey has met no surface there. Instead of an entry that faces the same
+    /// way anywhere near, which may be the far side of a wall, it takes the nearest entry that faces the point: first of its
+    /// own facing within the reach, then of any. Nothing stands between the two but other surfaces that face it, which are
+    /// nearer. Without one, the point sees all.
+    pub fn everywhere(&self, grid: &Grid, cell: &Cell, at: Vec3, facing: Facing, test: &TableTest) -> Seen {
+        let own = self.look_up(grid, cell, at, facing, &TableTest { reach_voxels: 0, ..*test });
+        if own.mask != 0 || own.far.is_some() {
+            return own;
+        }
+        let place = grid.fraction_in(cell, at) * self.voxels_per_cell as f32;
+        let reach = (test.reach_voxels * test.reach_voxels) as f32;
+        let candidate = |entry: Entry| {
+            let way = place - (entry.voxel.as_vec3() + 0.5);
+            // Within a voxel the surface may lie on either side.
+            let faces = entry.mask != 0 && way.dot(entry.facing) >= -0.5;
+            let is_other = Facing::of(entry.facing) != facing || way.length_squared() > reach;
+            faces.then(|| (is_other, way.length_squared(), entry.index, entry.mask))
+        };
+        let candidates = self.entries(grid.cell_index(cell)).filter_map(candidate);
+        let nearest = candidates.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+        Seen { mask: nearest.map_or(u8::MAX, |(.., mask)| mask), far: None }
+    }
+
     /// The probe beyond its own cell that stands in for an entry which sees none of its eight.
     fn far_probe(&self, entry: usize) -> Option<ProbeIndex> {
         let found = self.far.binary_search_by_key(&(entry as u32), |f| f.0).ok()?;

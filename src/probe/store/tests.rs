@@ -75,6 +75,32 @@ fn a_surface_that_sees_nothing_asks_beside_and_farther() {
 }
 
 #[test]
+fn every_point_sees_what_the_nearest_surface_that_faces_it_sees() {
+    let (table, grid) = (table(), grid());
+    let seen = |at: [f32; 3], normal: Vec3| {
+        let at = Vec3::from(at);
+        table.everywhere(&grid, &grid.cell(at), at, facing(normal), &TableTest::default())
+    };
+    let mask = |at: [f32; 3]| seen(at, Vec3::X).mask;
+    // Voxel centres at 1/8 and 7/8: the first faces up to the middle of the cell, the last faces away from it.
+    assert_eq!(mask([0.5, 0.5, 0.5]), 0b0000_0011);
+    assert_eq!(mask([0.95, 0.7, 0.95]), 0b0000_0011);
+    // Half a voxel below its centre a surface may still lie below the point; above it does.
+    assert_eq!(mask([0.9, 0.8, 0.9]), 0b1000_0000);
+    assert_eq!(mask([0.9, 0.99, 0.9]), 0b1000_0000);
+    // An entry that sees nothing has no answer, and a cell without surfaces hides nothing.
+    assert_eq!(mask([0.4, 0.2, 0.1]), 0b0000_0011);
+    assert_eq!(mask([1.5, 0.5, 0.5]), u8::MAX);
+    // Where there is an entry of its own, it counts, with the probe farther away of one that sees no other.
+    assert_eq!(seen([0.1, 0.1, 0.1], Vec3::Y).mask, 0b0000_0011);
+    assert_eq!(seen([0.40, 0.1, 0.1], Vec3::Y), Seen { mask: 0, far: Some(ProbeIndex(11)) });
+    // The plain look-up takes the nearest entry of the same facing, although it faces away from the point.
+    let at = [0.95, 0.7, 0.95];
+    assert_eq!(look_up(&table, Vec3::from(at), Vec3::Y).mask, 0b1000_0000);
+    assert_eq!(seen(at, Vec3::Y).mask, 0b0000_0011);
+}
+
+#[test]
 fn keys_and_voxels_are_inverse() {
     for n in [1, 4, 22] {
         for voxel in [UVec3::ZERO, UVec3::new(n - 1, 0, n / 2), UVec3::splat(n - 1)] {

@@ -2,11 +2,10 @@
 
 use glam::{Vec2, Vec3, Vec3A};
 
-use super::Irradiance;
 use crate::math::harmonics::{self, COUNT, Y0};
 use crate::math::octahedral::direction_from_oct;
 use crate::probe::store::map::{OctahedralMaps, fill_with_border};
-use crate::probe::store::sh::Functions;
+use crate::probe::store::sh::{Functions, ShIrradiance};
 
 /// By which factors a probe's unknowns add up to its irradiance around a direction.
 pub struct Factors<'i>(Kind<'i>);
@@ -20,7 +19,23 @@ enum Kind<'i> {
     Presampled { maps: &'i OctahedralMaps<Vec3A>, functions: Vec<Functions> },
 }
 
-impl Factors<'_> {
+impl<'i> Factors<'i> {
+    /// Of maps whose texels are the unknowns.
+    pub fn of_maps(maps: &'i OctahedralMaps<Vec3A>) -> Factors<'i> {
+        let own: Vec<u32> = (0..(maps.resolution * maps.resolution) as u32).collect();
+        let mut interior = vec![0; maps.texels_per_probe()];
+        fill_with_border(&own, maps.resolution, maps.border, &mut interior);
+        Factors(Kind::Maps { maps, interior })
+    }
+
+    /// Of coefficients, read by what shading reads of them.
+    pub fn of_harmonics(sh: &'i ShIrradiance) -> Factors<'i> {
+        Factors(match sh.presampled() {
+            Some((maps, functions)) => Kind::Presampled { maps, functions },
+            None => Kind::Functions { gradient: sh.store().gradient },
+        })
+    }
+
     /// Calls `add(unknown, factor)` for all unknowns that count around `oct`, for a point that is `offset` from the probe, in
     /// its spacings. Irradiance is their sum where the store is linear.
     #[inline]
@@ -55,48 +70,6 @@ impl Factors<'_> {
         match self.0 {
             Kind::Maps { .. } => 1.0,
             Kind::Functions { .. } | Kind::Presampled { .. } => f64::from(Y0).powi(-2),
-        }
-    }
-}
-
-impl Irradiance {
-    /// Irradiance as a function of the unknowns of a fit.
-    pub fn factors(&self) -> Factors<'_> {
-        Factors(match self {
-            Irradiance::Maps { maps, .. } => {
-                let own: Vec<u32> = (0..self.unknowns() as u32).collect();
-                let mut interior = vec![0; maps.texels_per_probe()];
-                fill_with_border(&own, maps.resolution, maps.border, &mut interior);
-                Kind::Maps { maps, interior }
-            }
-            Irradiance::Sh9(sh) => match sh.presampled() {
-                Some((maps, functions)) => Kind::Presampled { maps, functions },
-                None => Kind::Functions { gradient: sh.store().gradient },
-            },
-        })
-    }
-
-    /// Unknowns of a fit of one probe: those of the solver, and the gradient where there is one.
-    pub fn fitted_unknowns(&self) -> usize {
-        match self {
-            Irradiance::Maps { .. } => self.unknowns(),
-            Irradiance::Sh9(sh) => sh.fitted_unknowns(),
-        }
-    }
-
-    /// These of a probe, W·m⁻².
-    pub fn fitted(&self, probe: usize) -> Vec<Vec3A> {
-        match self {
-            Irradiance::Maps { .. } => self.probe(probe).map(Vec3A::from).collect(),
-            Irradiance::Sh9(sh) => sh.fitted(probe),
-        }
-    }
-
-    /// Sets them.
-    pub fn set_fitted(&mut self, probe: usize, values: &[Vec3A]) {
-        match self {
-            Irradiance::Maps { .. } => self.set_probe(probe, values),
-            Irradiance::Sh9(sh) => sh.set_fitted(probe, values),
         }
     }
 }

@@ -157,7 +157,7 @@ fn visibility_line(config: &Config, placement: &Placement, kept: bool, blocked: 
         _ => {
             let probes = placement.states.len();
             let per_probe =
-                occlusion.runtime_bytes(config.store.border, placement.survey.as_ref(), probes, &config.store.layout);
+                occlusion.runtime_bytes(config.store.border, placement.regions.as_ref(), probes, &config.store.layout);
             let saved_bytes = Some((per_probe * probes as f64).round() as u64);
             Line { saved_bytes, ..line(VISIBILITY, false, "every surface sees all probes around it") }
         }

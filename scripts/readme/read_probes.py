@@ -99,8 +99,11 @@ class Probes:
 
     def seen(self, g, base, fraction, normal):
         """Mask of the cell's eight probes that a surface sees, bit i for corner i, and a farther probe or None."""
+        if "visibility_tree" in self.tensors:
+            return self.seen_in_tree(base, fraction, normal)
         if "visibility" not in self.tensors:
             return 255, None  # left out by the plan: every surface sees all probes around it
+        # A file of before query version 4.
         n = int(self.meta["visibility.voxels_per_cell"])
         cell = base[0] + self.cells[0] * (base[1] + self.cells[1] * base[2])
         first, end = (int(i) for i in self.tensors["visibility_start"][cell : cell + 2])
@@ -123,6 +126,47 @@ class Probes:
         if masks[entry]:
             return masks[entry], None
         # None of the eight: the voxel across a border that is near, else a farther probe.
+        def mask_of(v):
+            entry = self.find(keys, key(v))
+            return 0 if entry is None else int(masks[entry])
+
+        if mask := self.beside(voxel, fraction, n, mask_of):
+            return mask, None
+        far = self.tensors.get("visibility_far", np.zeros((0, 2), int))
+        probe = far[far[:, 0] == first + entry, 1]
+        return 0, int(probe[0]) if probe.size else None
+
+    def seen_in_tree(self, base, fraction, normal):
+        n = int(self.meta["visibility.voxels_per_cell"])
+        words = self.tensors["visibility_tree"]
+        cell = base[0] + self.cells[0] * (base[1] + self.cells[1] * base[2])
+        root = int(self.tensors["visibility_root"][cell])
+        voxel = np.minimum((fraction * np.float32(n)).astype(int), n - 1)
+        axis = int(np.abs(normal).argmax())
+        facing = 2 * axis + int(normal[axis] < 0)
+
+        def number(i):
+            return int(words[i]) | int(words[i + 1]) << 16
+
+        def part(v):
+            at, i = [*v, facing], root
+            while (word := int(words[i])) < 1 << 15:
+                below, distance = at[word >> 13] < (word >> 8 & 31), word & 255
+                if distance == 0:
+                    i += 3 if below else number(i + 1)
+                else:
+                    i += 1 if below else distance
+            return i
+
+        own = part(voxel)
+        mask = int(words[own]) & 255
+        if mask == 0:
+            mask = self.beside(voxel, fraction, n, lambda v: int(words[part(v)]) & 255)
+        far = mask == 0 and int(words[own]) & 1 << 14
+        return mask, number(own + 1) if far else None
+
+    def beside(self, voxel, fraction, n, mask_of):
+        """Mask of the voxel across a border that is near, 0 where there is none that sees anything."""
         inside = fraction * np.float32(n) - voxel.astype(np.float32)
         low, high = (inside < self.strip) & (voxel > 0), (inside > 1 - self.strip) & (voxel < n - 1)
         step = np.where(low, -1, np.where(high, 1, 0))
@@ -130,12 +174,9 @@ class Probes:
             if all(step[axes]):
                 neighbour = voxel.copy()
                 neighbour[axes] += step[axes]
-                beside = self.find(keys, key(neighbour))
-                if beside is not None and masks[beside]:
-                    return masks[beside], None
-        far = self.tensors.get("visibility_far", np.zeros((0, 2), int))
-        probe = far[far[:, 0] == first + entry, 1]
-        return 0, int(probe[0]) if probe.size else None
+                if mask := mask_of(neighbour):
+                    return mask
+        return 0
 
     @staticmethod
     def find(keys, key):

@@ -102,7 +102,7 @@ impl Prepared<'_, '_> {
         let store = &self.config.store;
         let occlusion = if self.stores_occlusion() { &store.occlusion } else { &OcclusionStore::None };
         let directions = self.capture.rays.directions();
-        occlusion.builder(self.placement.survey.as_ref(), &directions, &self.grid, store.border)
+        occlusion.builder(self.placement.regions.as_ref(), &directions, &self.grid, store.border)
     }
 
     pub(super) fn active(&self) -> Vec<usize> {
@@ -190,8 +190,8 @@ impl Prepared<'_, '_> {
         let moved = self.config.placement.rule.moves();
         let own = store.layout.head_bytes(moved) + store.irradiance.runtime_bytes(store.border) + field;
         let always = own as f64 + self.grid.runtime_bytes(moved);
-        let survey = self.placement.survey.as_ref();
-        let occlusion = store.occlusion.runtime_bytes(store.border, survey, probes, &store.layout);
+        let regions = self.placement.regions.as_ref();
+        let occlusion = store.occlusion.runtime_bytes(store.border, regions, probes, &store.layout);
         let kept_levels = if self.plan.radiance_levels { levels } else { 0 } as f64;
         let kept = always + kept_levels + if self.plan.visibility { occlusion } else { 0.0 };
         (always + levels as f64 + occlusion, kept)

@@ -69,8 +69,8 @@ impl<'w, 's> Traced<'w, 's> {
     }
 
     fn volume(&self) -> Volume {
-        let survey = self.prepared.placement.survey.clone().filter(|_| self.prepared.plan.visibility);
-        self.prepared.volume(survey.map_or(Occlusion::None, Occlusion::Surface))
+        let regions = self.prepared.placement.regions.clone().filter(|_| self.prepared.plan.visibility);
+        self.prepared.volume(regions.map_or(Occlusion::None, Occlusion::Regions))
     }
 }
 

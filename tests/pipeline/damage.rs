@@ -188,11 +188,12 @@ fn wrong_tensors_under_right_hashes() {
     refused("--set encoding.irradiance=f32", Box::new(set("irradiance", 8, nan)));
     // All ones: infinities and NaN of the packed format.
     refused("", Box::new(set("irradiance", 8, [0xFF; 4])));
-    refused("", Box::new(set("visibility_start", 0, [1, 0, 0, 0])));
-    refused("", Box::new(set("visibility_start", 8, [0xFF; 4])));
+    refused("", Box::new(set("visibility_root", 0, [0xFF; 4])));
+    // A plane whose parts never begin.
+    refused("", Box::new(set("visibility_tree", 0, [0; 2])));
     refused(MOMENTS, Box::new(set("distance_scale", 0, nan)));
     refused(MOMENTS, Box::new(set("distance_scale", 0, (-1f32).to_le_bytes())));
-    for name in ["position", "state", "irradiance", "visibility_start", "visibility_key"] {
+    for name in ["position", "state", "irradiance", "visibility_root", "visibility_tree"] {
         refused("", Box::new(move |c| drop(c.tensors.remove(name))));
         // One element short along the first axis.
         refused(
@@ -207,13 +208,13 @@ fn wrong_tensors_under_right_hashes() {
     }
 }
 
-/// Keys that no writer of this program makes, out of range and out of order, may give wrong light but never a panic.
+/// Trees that no writer of this program makes are refused or give wrong light, but never a panic.
 #[test]
-fn odd_visibility_keys_do_not_panic() {
+fn odd_visibility_trees_do_not_panic() {
     let folder = Folder::new();
     let path = altered(&folder, "", |c| {
-        let keys = c.tensors.get_mut("visibility_key").unwrap();
-        keys.bytes.iter_mut().enumerate().for_each(|(i, b)| *b = (i * 151) as u8);
+        let words = c.tensors.get_mut("visibility_tree").unwrap();
+        words.bytes.iter_mut().enumerate().for_each(|(i, b)| *b = (i * 151) as u8);
     });
     let output = folder.path().join("out");
     let run =

@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::settings::PlacementSettings;
 use crate::probe::lattice::{Grid, ProbeState};
 use crate::probe::store::OcclusionStore;
+use crate::probe::store::regions::Regions;
 use crate::probe::store::surface::SurfaceVisibility;
 
 /// The probes before they are captured.
@@ -21,6 +22,8 @@ pub struct Placement {
     pub relocated: usize,
     /// What surfaces see of their probes; `None` where the method does not ask.
     pub survey: Option<SurfaceVisibility>,
+    /// The same as look-ups ask it; `None` where they do not.
+    pub regions: Option<Regions>,
     pub rays: u64,
 }
 

@@ -74,6 +74,7 @@ pub fn settle_all(world: &World, task: &PlacementTask) -> Placement {
         asked: sampled.clone(),
         sampled,
         survey: None,
+        regions: None,
     }
 }
 

@@ -7,6 +7,7 @@ use super::settle::{Settler, settle_all};
 use super::survey::Surveyor;
 use crate::light::World;
 use crate::probe::lattice::{Grid, ProbeState};
+use crate::probe::store::regions::Regions;
 use crate::probe::store::surface::SurfaceVisibility;
 use crate::scene::Mesh;
 
@@ -33,6 +34,7 @@ pub fn place(world: &World, task: &PlacementTask, surveying: impl FnOnce()) -> P
     // weigh nothing.
     if occlusion.keeps_survey() {
         table.far = need::far_probes(world, grid, &placement, &table, &settings.survey);
+        placement.regions = Some(Regions::new(grid, &table));
         leave_unseen(&world.scene.mesh, grid, &mut placement, &table, settings.keep_unsampled);
     }
     placement.survey = Some(table);

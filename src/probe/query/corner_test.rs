@@ -7,6 +7,7 @@ use super::point::QueryPoint;
 use crate::probe::lattice::grid::{Cell, Grid, ProbeIndex};
 use crate::probe::store::map::OctahedralMaps;
 use crate::probe::store::moments::chebyshev_shortened;
+use crate::probe::store::regions::Regions;
 use crate::probe::store::surface::{Seen, SurfaceVisibility, TableTest};
 use crate::probe::store::tiles::{Tiles, box_sides};
 
@@ -78,6 +79,24 @@ impl CornerTest for SurfaceTest<'_> {
             false => self.table.look_up(grid, cell, biased, point.facing, &self.test),
             true => self.table.everywhere(grid, cell, biased, point.facing, &self.test),
         }
+    }
+
+    #[inline]
+    fn factor(&self, _: ProbeIndex, _: Vec3) -> f32 {
+        1.0
+    }
+}
+
+/// The same as trees.
+pub struct RegionsTest<'v> {
+    pub regions: &'v Regions,
+    pub strip: f32,
+}
+
+impl CornerTest for RegionsTest<'_> {
+    #[inline]
+    fn seen(&self, grid: &Grid, cell: &Cell, point: &QueryPoint, biased: Vec3) -> Seen {
+        self.regions.look_up(grid, cell, biased, point.facing, self.strip)
     }
 
     #[inline]

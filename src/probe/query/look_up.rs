@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::corner_test::{CornerTest, Mask, MomentsTest, SurfaceTest, TilesTest};
+use super::corner_test::{CornerTest, Mask, MomentsTest, RegionsTest, SurfaceTest, TilesTest};
 use super::point::{CornerWeights, Part, QueryPoint, Visibility};
 use super::settings::{LookUp, QuerySettings, VisibilityTest, WeightNormal};
 use crate::math::octahedral::oct_from_direction;
@@ -23,6 +23,7 @@ enum Test<'v> {
     Moments(MomentsTest<'v>),
     Tiles(TilesTest<'v>),
     Surface(SurfaceTest<'v>),
+    Regions(RegionsTest<'v>),
 }
 
 impl<'v> Query<'v> {
@@ -41,12 +42,13 @@ impl<'v> Query<'v> {
                     let moments = |maps| Test::Moments(MomentsTest { maps, positions, power, floor, shorter });
                     occlusion.moments().map(moments).or_else(|| occlusion.tiles().map(tiles))
                 }
-                VisibilityTest::Table(test) => {
-                    occlusion.surface().map(|table| Test::Surface(SurfaceTest { table, test, everywhere: false }))
-                }
-                VisibilityTest::Everywhere(test) => {
-                    occlusion.surface().map(|table| Test::Surface(SurfaceTest { table, test, everywhere: true }))
-                }
+                VisibilityTest::Table(test) | VisibilityTest::Everywhere(test) => match occlusion.regions() {
+                    Some(regions) => Some(Test::Regions(RegionsTest { regions, strip: test.strip })),
+                    None => {
+                        let everywhere = matches!(self.settings.test, VisibilityTest::Everywhere(_));
+                        occlusion.surface().map(|table| Test::Surface(SurfaceTest { table, test, everywhere }))
+                    }
+                },
             },
         };
         found.unwrap_or(Test::Mask(Mask(u8::MAX)))
@@ -89,15 +91,20 @@ impl<'v> Query<'v> {
             Test::Moments(test) => self.weigh(point, &test),
             Test::Tiles(test) => self.weigh(point, &test),
             Test::Surface(test) => self.weigh(point, &test),
+            Test::Regions(test) => self.weigh(point, &test),
         }
     }
 
     /// Which corners of its cell the stored table says that a point sees, where it is all the test there is: it then needs to
     /// be looked up only once. 0 where it says none, or there is more to the test.
     pub fn stored_mask(&self, point: &QueryPoint) -> u8 {
-        let Test::Surface(test) = self.test(Visibility::Stored) else { return 0 };
-        let biased = self.biased(point);
-        let seen = test.seen(&self.volume.grid, &self.cell_of(point, biased), point, biased);
+        let (biased, grid) = (self.biased(point), &self.volume.grid);
+        let cell = || self.cell_of(point, biased);
+        let seen = match self.test(Visibility::Stored) {
+            Test::Regions(test) => test.seen(grid, &cell(), point, biased),
+            Test::Surface(test) => test.seen(grid, &cell(), point, biased),
+            Test::Mask(_) | Test::Moments(_) | Test::Tiles(_) => return 0,
+        };
         if seen.far.is_none() { seen.mask } else { 0 }
     }
 

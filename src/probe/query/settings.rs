@@ -110,10 +110,10 @@ pub enum VisibilityTest {
     None,
     /// Chebyshev's bound from the stored moments of distance, to a power, not below a floor.
     Chebyshev { power: f32, floor: f32 },
-    /// The table of visibility at surfaces.
+    /// Visibility at surfaces.
     Table(TableTest),
-    /// The same, but where it knows nothing, what the nearest surface sees that faces the point, and without one all: so
-    /// things that the bake did not know are lit, and the air is.
+    /// The same, but of a file that holds entries alone ([`crate::probe::store::surface`]) it takes, where there is none, what
+    /// the nearest surface sees that faces the point, and without one all. Trees have an answer everywhere.
     Everywhere(TableTest),
 }
 

@@ -12,6 +12,7 @@ pub mod map;
 pub mod moments;
 pub mod occlusion;
 pub mod radiance;
+pub mod regions;
 pub mod sh;
 pub mod surface;
 #[cfg(test)]

@@ -12,6 +12,7 @@ use super::kernel::Directions;
 use super::layout::LayoutSettings;
 use super::map::{OctahedralMaps, fill_with_border, interior_texel};
 use super::moments::{self, MomentsBuilder, MomentsStore};
+use super::regions::{self, Regions};
 use super::surface::{self, SurfaceVisibility};
 use super::tiles::{self, Tiles, TilesBuilder, box_sides};
 use crate::math::octahedral::oct_from_direction;
@@ -23,7 +24,7 @@ impl OcclusionStore {
     /// What collects occlusion while probes are captured and surfaces surveyed.
     pub fn builder(
         &self,
-        survey: Option<&SurfaceVisibility>,
+        regions: Option<&Regions>,
         captured: &Directions,
         grid: &Grid,
         border: usize,
@@ -35,7 +36,7 @@ impl OcclusionStore {
             }
             OcclusionStore::Tiles(store) => Under::Tiles(TilesBuilder::new(store, grid, border)),
             OcclusionStore::Surface(_) => {
-                Under::Done(survey.map_or(Occlusion::None, |table| Occlusion::Surface(table.clone())))
+                Under::Done(regions.map_or(Occlusion::None, |regions| Occlusion::Regions(regions.clone())))
             }
         })
     }
@@ -50,7 +51,9 @@ pub enum Occlusion {
     /// Mean and standard deviation of distance, metres.
     Moments(OctahedralMaps<Vec2>),
     Tiles(Tiles),
+    /// As older files hold it.
     Surface(SurfaceVisibility),
+    Regions(Regions),
 }
 
 /// Occlusion while it is collected.
@@ -135,7 +138,7 @@ impl Occlusion {
         match self {
             Occlusion::Moments(maps) => maps.sample(p, &maps.taps(oct_from_direction(direction))).x,
             Occlusion::Tiles(tiles) => tiles.distance(p, direction, box_sides(grid, probe)).x,
-            Occlusion::None | Occlusion::Surface(_) => 0.0,
+            Occlusion::None | Occlusion::Surface(_) | Occlusion::Regions(_) => 0.0,
         }
     }
 
@@ -143,6 +146,12 @@ impl Occlusion {
     #[inline]
     pub fn surface(&self) -> Option<&SurfaceVisibility> {
         if let Occlusion::Surface(table) = self { Some(table) } else { None }
+    }
+
+    /// The trees of visibility at surfaces, where there are any.
+    #[inline]
+    pub fn regions(&self) -> Option<&Regions> {
+        if let Occlusion::Regions(regions) = self { Some(regions) } else { None }
     }
 
     /// Bytes per probe in the layout that shading uses.
@@ -155,6 +164,7 @@ impl Occlusion {
             }
             Occlusion::Tiles(tiles) => tiles.store().runtime_bytes(tiles.maps.border) as f64,
             Occlusion::Surface(table) => table.bytes() as f64 / probes as f64,
+            Occlusion::Regions(regions) => regions.bytes() as f64 / probes as f64,
         }
     }
 
@@ -206,6 +216,7 @@ impl Occlusion {
             Occlusion::Moments(maps) => moments::write(maps, container, losses),
             Occlusion::Tiles(tiles) => tiles.write(container, losses),
             Occlusion::Surface(table) => surface::write(table, container),
+            Occlusion::Regions(regions) => regions::write(regions, container),
         }
     }
 
@@ -218,6 +229,8 @@ impl Occlusion {
             Occlusion::Tiles(Tiles::read(container, grid.probe_count(), border)?)
         } else if moments::is_in(container) {
             Occlusion::Moments(moments::read(container, grid.probe_count(), border)?)
+        } else if regions::is_in(container) {
+            Occlusion::Regions(regions::read(container, grid)?)
         } else if surface::is_in(container) {
             Occlusion::Surface(surface::read(container, grid)?)
         } else {
@@ -241,7 +254,7 @@ impl Occlusion {
         match self {
             Occlusion::None => None,
             Occlusion::Moments(_) | Occlusion::Tiles(_) => Some("chebyshev"),
-            Occlusion::Surface(_) => Some("table"),
+            Occlusion::Surface(_) | Occlusion::Regions(_) => Some("table"),
         }
     }
 
@@ -250,12 +263,15 @@ impl Occlusion {
         match self {
             Occlusion::None => 0,
             Occlusion::Moments(_) | Occlusion::Tiles(_) => 1,
-            Occlusion::Surface(_) => 2,
+            Occlusion::Surface(_) | Occlusion::Regions(_) => 2,
         }
     }
 
     /// Mean number of probes that a surface sees, of the eight around it; `None` where that is not stored.
     pub fn mean_visible(&self) -> Option<f64> {
+        if let Occlusion::Regions(regions) = self {
+            return Some(regions.mean_visible());
+        }
         let Occlusion::Surface(table) = self else { return None };
         let bits: u64 = table.masks.iter().map(|mask| u64::from(mask.count_ones())).sum();
         Some(bits as f64 / table.masks.len().max(1) as f64)
@@ -269,6 +285,9 @@ impl Occlusion {
             Occlusion::Tiles(tiles) => format!("tiles of {0}×{0} distances", tiles.maps.resolution).into(),
             Occlusion::Surface(table) => {
                 format!("{} voxels a cell along each axis, {} entries", table.voxels_per_cell, table.keys.len()).into()
+            }
+            Occlusion::Regions(regions) => {
+                format!("{} voxels a cell along each axis, {} parts", regions.voxels_per_cell, regions.parts()).into()
             }
         }
     }

@@ -9,7 +9,8 @@
 //! Storage: `key = voxel·6 + facing` (u16, voxel = x + n·(y + n·z), facing = 2·axis + (1 where negative)), sorted
 //! within each cell, with the mask (u8, bit i = corner i) beside it; `cell_start[c]..cell_start[c + 1]` are cell c's.
 //! Where a surface sees none of its eight probes — under a table, behind a pillar — a pair of u32 names its entry and
-//! a probe farther away that it does see.
+//! a probe farther away that it does see. So the survey leaves it, and files of before query version 4 hold it; what is
+//! asked and stored since is [`super::regions`].
 
 use glam::{UVec3, Vec3};
 use safetensors::Dtype;
@@ -40,8 +41,8 @@ impl Default for SurfaceStore {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TableTest {
-    /// Where the survey found no surface of this facing in a point's own voxel, the nearest entry within this many voxels
-    /// stands in. 1 or 6: no change of leaks above 1e-4 in the six scenes of [`crate::probe::place`]'s settings.
+    /// Of a file that holds entries alone: where the survey found no surface of this facing in a point's own voxel, the
+    /// nearest entry within this many voxels stands in. 1 or 6: no change of leaks above 1e-4 in the six scenes of [`crate::probe::place`]'s settings.
     pub reach_voxels: u32,
     /// Points nearer to a voxel's border than this share of its side may use the voxel beyond, where their own sees no
     /// probe: where walls meet, the survey may miss a strip much narrower than a voxel. 0.1 or 0.5: at most 3e-4 (thin_wall).
@@ -107,38 +108,9 @@ impl SurfaceVisibility {
         if mask != 0 {
             return Seen { mask, far: None };
         }
-        let beside = self.beside(keys, first, fraction, facing, test.strip);
+        let entry = |voxel| keys.binary_search(&key(voxel, facing, n));
+        let beside = beside(fraction, n, test.strip, |voxel| entry(voxel).map_or(0, |found| self.masks[first + found]));
         Seen { mask: beside, far: if beside == 0 { self.far_probe(first + found) } else { None } }
-    }
-
-    /// Mask of the voxel across a border that the point is close to, 0 where there is none.
-    ///
-    /// Where walls meet, the survey may miss a strip much narrower than a voxel; it continues in the next one.
-    fn beside(&self, keys: &[u16], first: usize, fraction: Vec3, facing: Facing, strip: f32) -> u8 {
-        let n = self.voxels_per_cell;
-        let voxel = voxel_of(fraction, n);
-        let inside = fraction * n as f32 - voxel.as_vec3();
-        // Along each axis: towards the nearer border, if near enough and within the cell.
-        let last = n - 1;
-        let step = |axis: usize| match inside[axis] {
-            x if x < strip && voxel[axis] > 0 => Some(voxel[axis] - 1),
-            x if x > 1.0 - strip && voxel[axis] < last => Some(voxel[axis] + 1),
-            _ => None,
-        };
-        let steps = [step(0), step(1), step(2)];
-        // One axis at a time first, then two, then all three.
-        [0b001, 0b010, 0b100, 0b011, 0b101, 0b110, 0b111u32]
-            .into_iter()
-            .filter_map(|axes| {
-                let mut neighbour = voxel;
-                for axis in (0..3).filter(|axis| axes >> axis & 1 == 1) {
-                    neighbour[axis] = steps[axis]?;
-                }
-                let found = keys.binary_search(&key(neighbour, facing, n)).ok()?;
-                Some(self.masks[first + found])
-            })
-            .find(|&mask| mask != 0)
-            .unwrap_or(0)
     }
 
     /// What any point of a cell sees, roughly where the survey has met no surface there. Instead of an entry that faces the same
@@ -165,7 +137,7 @@ impl SurfaceVisibility {
     }
 
     /// The probe beyond its own cell that stands in for an entry which sees none of its eight.
-    fn far_probe(&self, entry: usize) -> Option<ProbeIndex> {
+    pub fn far_probe(&self, entry: usize) -> Option<ProbeIndex> {
         let found = self.far.binary_search_by_key(&(entry as u32), |f| f.0).ok()?;
         Some(ProbeIndex(self.far[found].1))
     }
@@ -204,7 +176,37 @@ impl SurfaceVisibility {
     }
 }
 
-fn voxel_of(fraction: Vec3, n: u32) -> UVec3 {
+/// First mask that is not 0 of the voxels across a border that a point is close to, within its cell of n³; 0 where there is
+/// none.
+///
+/// Where walls meet, the survey may miss a strip much narrower than a voxel; it continues in the next one.
+pub fn beside(fraction: Vec3, n: u32, strip: f32, mask: impl Fn(UVec3) -> u8) -> u8 {
+    let voxel = voxel_of(fraction, n);
+    let inside = fraction * n as f32 - voxel.as_vec3();
+    // Along each axis: towards the nearer border, if near enough and within the cell.
+    let last = n - 1;
+    let step = |axis: usize| match inside[axis] {
+        x if x < strip && voxel[axis] > 0 => Some(voxel[axis] - 1),
+        x if x > 1.0 - strip && voxel[axis] < last => Some(voxel[axis] + 1),
+        _ => None,
+    };
+    let steps = [step(0), step(1), step(2)];
+    // One axis at a time first, then two, then all three.
+    [0b001, 0b010, 0b100, 0b011, 0b101, 0b110, 0b111u32]
+        .into_iter()
+        .filter_map(|axes| {
+            let mut neighbour = voxel;
+            for axis in (0..3).filter(|axis| axes >> axis & 1 == 1) {
+                neighbour[axis] = steps[axis]?;
+            }
+            Some(mask(neighbour))
+        })
+        .find(|&mask| mask != 0)
+        .unwrap_or(0)
+}
+
+#[inline]
+pub fn voxel_of(fraction: Vec3, n: u32) -> UVec3 {
     (fraction * n as f32).as_uvec3().min(UVec3::splat(n - 1))
 }
 
@@ -230,6 +232,15 @@ impl Facing {
 
     pub fn opposite(self) -> Facing {
         Facing(self.0 ^ 1)
+    }
+
+    pub fn all() -> impl Iterator<Item = Facing> {
+        (0..6).map(Facing)
+    }
+
+    #[inline]
+    pub fn index(self) -> u8 {
+        self.0
     }
 }
 

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use crate::probe::store::kernel::{Directions, Kernel};
 use crate::probe::store::layout::LayoutSettings;
 use crate::probe::store::moments::MomentsStore;
-use crate::probe::store::surface::{MAX_VOXELS_PER_CELL, SurfaceStore, SurfaceVisibility};
+use crate::probe::store::regions::Regions;
+use crate::probe::store::surface::{MAX_VOXELS_PER_CELL, SurfaceStore};
 use crate::probe::store::tiles::TileStore;
 
 /// How probes know which points they see.
@@ -88,11 +89,11 @@ impl OcclusionStore {
         matches!(self, OcclusionStore::Moments(_) | OcclusionStore::Tiles(_))
     }
 
-    /// Bytes of one probe in the layout that shading uses; `survey` is what surveying the surfaces found.
+    /// Bytes of one probe in the layout that shading uses; `regions` is what surveying the surfaces found.
     pub fn runtime_bytes(
         &self,
         border: usize,
-        survey: Option<&SurfaceVisibility>,
+        regions: Option<&Regions>,
         probes: usize,
         layout: &LayoutSettings,
     ) -> f64 {
@@ -100,7 +101,7 @@ impl OcclusionStore {
             OcclusionStore::None => 0.0,
             OcclusionStore::Moments(store) => store.runtime_bytes(border, layout.distance_scale) as f64,
             OcclusionStore::Tiles(store) => store.runtime_bytes(border) as f64,
-            OcclusionStore::Surface(_) => survey.map_or(0, SurfaceVisibility::bytes) as f64 / probes as f64,
+            OcclusionStore::Surface(_) => regions.map_or(0, Regions::bytes) as f64 / probes as f64,
         }
     }
 

@@ -1,0 +1,225 @@
+//! The table of visibility at surfaces as a tree per cell: what surfaces next to one another see alike is said once.
+//!
+//! A [`SurfaceVisibility`] names the mask of every voxel and facing that has a surface. Neighbours mostly agree, so each cell
+//! is divided instead by planes between voxels, and between facings, until every part holds entries of one mask alone. What
+//! an entry answers stays the same; every other voxel and facing gets the answer of the part it lies in, so that none is
+//! without one. [`grow`] divides.
+//!
+//! Storage: u16 words, `roots[c]` the first of cell c's tree; cells with the same tree share it. A word below 2¹⁵ divides:
+//! bits 13–14 axis (x, y, z, facing), bits 8–12 threshold t, bits 0–7 how many words farther on the part at and beyond t
+//! begins. The part below t follows. Where 8 bits are too few they are 0, and two words with the distance (low, high) come
+//! between. A word with bit 15 ends: bits 0–7 mask. Where the mask is 0 and bit 14 is set, two words follow, low and high,
+//! of the number of a probe farther away that the surface sees.
+
+mod grow;
+#[cfg(test)]
+mod tests;
+
+use std::collections::HashMap;
+
+use glam::{UVec3, Vec3};
+use rayon::prelude::*;
+use safetensors::Dtype;
+
+use super::surface::{Facing, MAX_VOXELS_PER_CELL, Seen, SurfaceVisibility, beside, voxel_of};
+use crate::probe::container::Container;
+use crate::probe::lattice::grid::{Cell, CellIndex, Grid, ProbeIndex};
+
+/// Bit of a word that ends.
+const LEAF: u16 = 1 << 15;
+/// Bit of such a word that a probe farther away follows.
+const FAR: u16 = 1 << 14;
+const AXIS_SHIFT: u32 = 13;
+const THRESHOLD_SHIFT: u32 = 8;
+/// Bits of the distance, and of the mask.
+const LOW: u16 = 0xff;
+/// Words of a number of 32 bits.
+const NUMBER: usize = 2;
+
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Regions {
+    pub voxels_per_cell: u32,
+    /// One a cell.
+    roots: Vec<u32>,
+    words: Vec<u16>,
+}
+
+impl Regions {
+    /// The trees of a table. Entries and their strips answer as the table does.
+    pub fn new(grid: &Grid, table: &SurfaceVisibility) -> Regions {
+        let trees: Vec<Vec<u16>> = (0..grid.cell_count() as u32)
+            .into_par_iter()
+            .map_init(grow::Grower::default, |grower, cell| grower.tree(table, CellIndex(cell)))
+            .collect();
+        let (mut roots, mut words) = (Vec::with_capacity(trees.len()), Vec::new());
+        let mut known: HashMap<Vec<u16>, u32> = HashMap::new();
+        for tree in trees {
+            let next = words.len() as u32;
+            let root = *known.entry(tree).or_insert_with_key(|tree| {
+                words.extend(tree);
+                next
+            });
+            roots.push(root);
+        }
+        Regions { voxels_per_cell: table.voxels_per_cell, roots, words }
+    }
+
+    /// What a point of a cell sees. `at` is a point of the cell, or stands for its nearest one; `facing` is the surface's main
+    /// direction; `strip` as in [`super::surface::TableTest`].
+    #[inline]
+    pub fn look_up(&self, grid: &Grid, cell: &Cell, at: Vec3, facing: Facing, strip: f32) -> Seen {
+        let n = self.voxels_per_cell;
+        let fraction = grid.fraction_in(cell, at);
+        let root = self.roots[grid.cell_index(cell).0 as usize] as usize;
+        let leaf = self.leaf(root, voxel_of(fraction, n), facing);
+        match self.mask(leaf) {
+            0 => {
+                let beside = beside(fraction, n, strip, |voxel| self.mask(self.leaf(root, voxel, facing)));
+                Seen { mask: beside, far: if beside == 0 { self.far(leaf) } else { None } }
+            }
+            mask => Seen { mask, far: None },
+        }
+    }
+
+    /// The word that ends at a voxel.
+    #[inline]
+    fn leaf(&self, root: usize, voxel: UVec3, facing: Facing) -> usize {
+        let at = [voxel.x as u16, voxel.y as u16, voxel.z as u16, u16::from(facing.index())];
+        let mut i = root;
+        loop {
+            let word = self.words[i];
+            if word & LEAF != 0 {
+                return i;
+            }
+            let is_below = at[usize::from(word >> AXIS_SHIFT)] < word >> THRESHOLD_SHIFT & 31;
+            i += match (usize::from(word & LOW), is_below) {
+                (0, true) => 1 + NUMBER,
+                (0, false) => number(&self.words[i + 1..]) as usize,
+                (_, true) => 1,
+                (distance, false) => distance,
+            };
+        }
+    }
+
+    #[inline]
+    fn mask(&self, leaf: usize) -> u8 {
+        (self.words[leaf] & LOW) as u8
+    }
+
+    fn far(&self, leaf: usize) -> Option<ProbeIndex> {
+        (self.words[leaf] & FAR != 0).then(|| ProbeIndex(number(&self.words[leaf + 1..])))
+    }
+
+    /// Parts that all cells are divided into, shared ones once.
+    pub fn parts(&self) -> usize {
+        let mut parts = 0;
+        let mut i = 0;
+        while let Some(&word) = self.words.get(i) {
+            parts += usize::from(word & LEAF != 0);
+            i += length(word);
+        }
+        parts
+    }
+
+    /// Mean number of probes seen, over all voxels and facings.
+    pub fn mean_visible(&self) -> f64 {
+        let n = self.voxels_per_cell;
+        let of_cell = |&root: &u32| -> u64 {
+            let places = (0..n.pow(3)).flat_map(|v| Facing::all().map(move |facing| (v, facing)));
+            let seen = |(v, facing)| {
+                let voxel = UVec3::new(v % n, v / n % n, v / (n * n));
+                u64::from(self.mask(self.leaf(root as usize, voxel, facing)).count_ones())
+            };
+            places.map(seen).sum()
+        };
+        let all = self.roots.len() as u64 * u64::from(n.pow(3)) * 6;
+        self.roots.par_iter().map(of_cell).sum::<u64>() as f64 / all.max(1) as f64
+    }
+
+    /// Bytes of its tensors.
+    pub fn bytes(&self) -> u64 {
+        (self.roots.len() * 4 + self.words.len() * 2) as u64
+    }
+}
+
+/// A number of two words.
+fn number(words: &[u16]) -> u32 {
+    u32::from(words[0]) | u32::from(words[1]) << 16
+}
+
+fn words_of(number: u32) -> [u16; NUMBER] {
+    [number as u16, (number >> 16) as u16]
+}
+
+/// Words up to the next one that divides or ends.
+fn length(word: u16) -> usize {
+    let has_number = if word & LEAF != 0 { word & FAR != 0 } else { word & LOW == 0 };
+    1 + if has_number { NUMBER } else { 0 }
+}
+
+/// Names in the file.
+const TREES: &str = "visibility_tree";
+const ROOTS: &str = "visibility_root";
+const VOXELS_KEY: &str = "visibility.voxels_per_cell";
+
+/// Whether a file holds trees.
+pub fn is_in(container: &Container) -> bool {
+    container.has(TREES)
+}
+
+/// Writes the trees.
+pub fn write(regions: &Regions, container: &mut Container) {
+    let (roots, words) = (&regions.roots, &regions.words);
+    container.put(ROOTS, Dtype::U32, &[roots.len()], roots.iter().map(|r| r.to_le_bytes()));
+    container.put(TREES, Dtype::U16, &[words.len()], words.iter().map(|w| w.to_le_bytes()));
+    container.put_json(VOXELS_KEY, &regions.voxels_per_cell);
+}
+
+/// Reads the trees; inverse of [`write`].
+///
+/// # Errors
+/// What is missing, or points to what is not there.
+pub fn read(container: &Container, grid: &Grid) -> Result<Regions, String> {
+    let voxels_per_cell: u32 = container.json(VOXELS_KEY)?;
+    if !(1..=MAX_VOXELS_PER_CELL).contains(&voxels_per_cell) {
+        return Err(format!("metadata '{VOXELS_KEY}' is {voxels_per_cell}"));
+    }
+    let words: Vec<u16> = container.tensor(TREES, &[Dtype::U16], &[None])?.u16s().collect();
+    let roots: Vec<u32> = container.tensor(ROOTS, &[Dtype::U32], &[Some(grid.cell_count())])?.u32s().collect();
+    let firsts = firsts(&words, grid.probe_count()).ok_or_else(|| format!("tensor '{TREES}' holds no trees"))?;
+    if roots.iter().any(|root| firsts.binary_search(root).is_err()) {
+        return Err(format!("tensor '{ROOTS}' names words of '{TREES}' at which no tree begins"));
+    }
+    Ok(Regions { voxels_per_cell, roots, words })
+}
+
+/// Where each of the trees begins that the words are, one after another; `None` where they are none, or name a probe that
+/// does not exist.
+fn firsts(words: &[u16], probes: usize) -> Option<Vec<u32>> {
+    let mut firsts = Vec::new();
+    // Where the parts at and beyond the thresholds have to begin.
+    let mut expected: Vec<usize> = Vec::new();
+    let (mut i, mut is_first) = (0, true);
+    while let Some(&word) = words.get(i) {
+        if is_first {
+            firsts.push(i as u32);
+        }
+        let end = i + length(word);
+        let number = if end > i + 1 { Some(number(words.get(i + 1..end)?)) } else { None };
+        is_first = false;
+        if word & LEAF == 0 {
+            expected.push(i + number.map_or(usize::from(word & LOW), |n| n as usize));
+        } else {
+            if number.is_some_and(|probe| probe as usize >= probes || word & LOW != 0) {
+                return None;
+            }
+            match expected.pop() {
+                Some(expected) if expected != end => return None,
+                Some(_) => {}
+                None => is_first = true,
+            }
+        }
+        i = end;
+    }
+    (is_first && i == words.len()).then_some(firsts)
+}

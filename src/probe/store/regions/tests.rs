@@ -1,0 +1,143 @@
+//! Trees against the tables that they stand for.
+
+use glam::{DVec3, UVec3, Vec3};
+
+use super::*;
+use crate::math::random::{Purpose, Random};
+use crate::probe::store::surface::{TableTest, key};
+
+fn grid() -> Grid {
+    Grid::from_parts(DVec3::ZERO, Vec3::ONE, UVec3::new(3, 2, 2)).unwrap()
+}
+
+/// A first cell with random surfaces of a few masks, a second without any. Every third entry that sees nothing has a probe
+/// farther away.
+fn table(n: u32, share: f32, masks: &[u8], seed: u64) -> SurfaceVisibility {
+    let mut random = Random::new(seed, Purpose::FitPoints, 0, 0);
+    let mut table = SurfaceVisibility { voxels_per_cell: n, ..Default::default() };
+    for v in 0..n.pow(3) {
+        for facing in Facing::all() {
+            if random.uniform() < share {
+                // The masks change from one side of the cell to the other, with exceptions.
+                let side = usize::from(2 * (v % n) >= n);
+                let place =
+                    if random.uniform() < 0.9 { side } else { (random.uniform() * masks.len() as f32) as usize };
+                table.keys.push(key(UVec3::new(v % n, v / n % n, v / (n * n)), facing, n));
+                table.masks.push(masks[place.min(masks.len() - 1)]);
+            }
+        }
+    }
+    let nothing = (0..table.keys.len()).filter(|&i| table.masks[i] == 0);
+    table.far = nothing.step_by(3).map(|i| (i as u32, i as u32 % 12)).collect();
+    table.cell_start = vec![0, table.keys.len() as u32, table.keys.len() as u32];
+    table
+}
+
+#[test]
+fn entries_and_their_strips_answer_as_in_the_table() {
+    let grid = grid();
+    for (n, share, masks, seed) in [
+        (2, 0.5, &[3u8, 0][..], 1),
+        (8, 0.1, &[15, 240, 0, 255], 2),
+        (8, 0.6, &[0, 85, 3, 0, 7, 9], 3),
+        (22, 0.3, &[1, 2, 3, 4, 5, 0], 4),
+    ] {
+        let table = table(n, share, masks, seed);
+        let regions = Regions::new(&grid, &table);
+        let mut random = Random::new(seed, Purpose::FitPoints, 1, 0);
+        let (mut asked, mut beside) = (0, 0);
+        for entry in table.entries(CellIndex(0)) {
+            for _ in 0..8 {
+                let place = Vec3::from_array(std::array::from_fn(|_| random.uniform()));
+                let at = (entry.voxel.as_vec3() + place) / n as f32;
+                // Rounding may take a point across a border.
+                if voxel_of(grid.fraction_in(&grid.cell(at), at), n) != entry.voxel {
+                    continue;
+                }
+                let (cell, facing, test) = (grid.cell(at), Facing::of(entry.facing), TableTest::default());
+                let expected = table.look_up(&grid, &cell, at, facing, &test);
+                assert_eq!(regions.look_up(&grid, &cell, at, facing, test.strip), expected, "n {n} at {at}");
+                asked += 1;
+                beside += usize::from(entry.mask == 0 && expected.mask != 0);
+            }
+        }
+        assert!(asked > 20 && beside > 0, "{asked} {beside}");
+    }
+}
+
+#[test]
+fn parts_reach_between_the_surfaces_and_empty_cells_see_all() {
+    // A floor: its left half sees the left corners, its right half the right ones.
+    let n = 8;
+    let floor =
+        |v: u32| (key(UVec3::new(v % n, 0, v / n), Facing::of(Vec3::Y), n), if v % n < 4 { 0x55 } else { 0xaa });
+    let mut entries: Vec<(u16, u8)> = (0..n * n).map(floor).collect();
+    entries.sort_unstable();
+    let (keys, masks) = entries.into_iter().unzip();
+    let table = SurfaceVisibility { voxels_per_cell: n, cell_start: vec![0, 64, 64], keys, masks, far: Vec::new() };
+    let (grid, regions) = (grid(), Regions::new(&grid(), &table));
+    let mask = |at: [f32; 3], facing: Vec3| {
+        let at = Vec3::from(at);
+        regions.look_up(&grid, &grid.cell(at), at, Facing::of(facing), 0.25).mask
+    };
+    for normal in [Vec3::Y, Vec3::NEG_Y, Vec3::X] {
+        assert_eq!(mask([0.1, 0.9, 0.7], normal), 0x55);
+        assert_eq!(mask([0.9, 0.5, 0.2], normal), 0xaa);
+        assert_eq!(mask([1.5, 0.5, 0.5], normal), 0xff);
+        // Beyond the hull the nearest place of the cell counts.
+        assert_eq!(mask([0.1, -3.0, 0.5], normal), 0x55);
+    }
+    // One plane and two ends, one end: four words, and two roots.
+    assert_eq!((regions.parts(), regions.bytes()), (3, 4 * 2 + 2 * 4));
+    assert_eq!(regions.mean_visible(), 6.0);
+}
+
+#[test]
+fn cells_that_see_alike_share_a_tree() {
+    let table = SurfaceVisibility {
+        voxels_per_cell: 1,
+        cell_start: vec![0, 1, 2],
+        keys: vec![2, 2],
+        masks: vec![9, 9],
+        far: Vec::new(),
+    };
+    assert_eq!(Regions::new(&grid(), &table).bytes(), 2 * 4 + 2);
+}
+
+#[test]
+fn trees_come_back_from_the_file_and_damaged_ones_do_not() {
+    let regions = Regions::new(&grid(), &table(22, 0.3, &[1, 2, 3, 4, 5, 0], 5));
+    // Some need more than eight bits from one part to the other.
+    assert!(regions.words.len() > 1000 && regions.words[0] & LOW == 0);
+    let written = |change: &dyn Fn(&mut Regions)| {
+        let (mut regions, mut container) = (regions.clone(), Container::default());
+        change(&mut regions);
+        write(&regions, &mut container);
+        read(&container, &grid())
+    };
+    assert_eq!(written(&|_| ()).unwrap(), regions);
+    let far = (0..).find(|&i| regions.words[i] == LEAF | FAR).unwrap();
+    let changes: [(&dyn Fn(&mut Regions), &str); 8] = [
+        (&|r| r.roots[1] = 1, ROOTS),
+        (&|r| r.roots[0] = u32::MAX, ROOTS),
+        (&|r| r.roots.truncate(1), ROOTS),
+        (&|r| r.words.truncate(r.words.len() - 2), TREES),
+        (&|r| r.words.push(0), TREES),
+        (&|r| r.words[1] ^= 1, TREES),
+        (&|r| r.words[far + 1] = 12, TREES),
+        (&|r| r.voxels_per_cell = 23, VOXELS_KEY),
+    ];
+    for (i, (change, words)) in changes.into_iter().enumerate() {
+        let error = written(change).unwrap_err();
+        assert!(error.contains(words), "{i}: {error}");
+    }
+    // No number of this kind panics.
+    for seed in 0..200 {
+        let mut random = Random::new(seed, Purpose::FitPoints, 2, 0);
+        let words: Vec<u16> = (0..20).map(|_| random.bits() as u16).collect();
+        if let Some(firsts) = firsts(&words, 12) {
+            let roots = vec![firsts[0]; 2];
+            assert!(Regions { voxels_per_cell: 8, roots, words }.mean_visible() <= 8.0);
+        }
+    }
+}

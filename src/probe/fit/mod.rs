@@ -9,6 +9,7 @@
 //! own weights, and [`solve`] the solver. The probes then hold no physical light any more.
 
 mod figures;
+pub mod normal;
 pub mod points;
 pub mod rows;
 mod settings;
@@ -96,7 +97,7 @@ pub fn bytes(fit: &Fit, active: u64, unknowns: u64) -> u64 {
         Fit::None => 0,
         Fit::Rows(settings) => {
             let points = 2 * u64::from(settings.rows_per_probe) * active;
-            points * Row::BYTES + solve::bytes(active * unknowns)
+            points * Row::BYTES + normal::bytes(active, unknowns) + solve::bytes(active * unknowns)
         }
     }
 }

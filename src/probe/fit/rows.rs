@@ -4,6 +4,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::normal::MOST_UNKNOWNS;
 use super::points::Asked;
 use crate::probe::Volume;
 use crate::probe::query::{Part, Query, QuerySettings};
@@ -19,8 +20,10 @@ pub struct Row {
 }
 
 impl Row {
-    /// Most bytes that one takes: eight parts, twice while they are collected, their lists by probe, and what is known of the point.
-    pub const BYTES: u64 = (8 * (2 * size_of::<Part>() + 2 * size_of::<u32>()) + size_of::<Row>() + 256) as u64;
+    /// Most bytes that one takes: eight parts, twice while they are collected, their lists by probe and factors, and what is known of the point.
+    pub const BYTES: u64 = (8 * (2 * size_of::<Part>() + 2 * size_of::<u32>() + MOST_UNKNOWNS * size_of::<f32>())
+        + size_of::<Row>()
+        + 256) as u64;
 
     /// The row of a point. It has no parts where the point finds no probe.
     pub fn of(query: &QuerySettings, volume: &Volume, asked: &Asked, target: Vec3) -> Row {
@@ -83,6 +86,30 @@ impl<'f, 'i> Rows<'f, 'i> {
         (self.probe_start.len() - 1) * self.unknowns
     }
 
+    pub fn probes(&self) -> usize {
+        self.probe_start.len() - 1
+    }
+
+    /// Of each probe.
+    pub fn unknowns(&self) -> usize {
+        self.unknowns
+    }
+
+    /// What each part takes of its probe's unknowns, its share included.
+    pub fn part_factors(&self) -> Vec<f32> {
+        let mut out = vec![0.0; self.parts.len() * self.unknowns];
+        out.par_chunks_mut(self.unknowns).with_min_len(CHUNK).zip(&self.parts).for_each(|(own, part)| {
+            self.factors.each(part.oct, part.offset, |unknown, factor| own[unknown] += factor * part.share);
+        });
+        out
+    }
+
+    /// A row's parts, with their numbers among all.
+    pub fn parts_of_row(&self, row: u32) -> impl Iterator<Item = (usize, &Part)> {
+        let range = self.start[row as usize] as usize..self.start[row as usize + 1] as usize;
+        range.clone().zip(&self.parts[range])
+    }
+
     pub fn weights(&self) -> &[f32] {
         &self.weights
     }
@@ -133,7 +160,8 @@ impl<'f, 'i> Rows<'f, 'i> {
         out
     }
 
-    fn parts_of(&self, probe: usize) -> &[(u32, u32)] {
+    /// Numbers of a probe's parts, each with its row.
+    pub fn parts_of(&self, probe: usize) -> &[(u32, u32)] {
         &self.of_probe[self.probe_start[probe] as usize..self.probe_start[probe + 1] as usize]
     }
 }

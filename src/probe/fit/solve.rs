@@ -4,6 +4,7 @@
 use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 
+use super::normal::Normal;
 use super::rows::Rows;
 
 pub struct Task<'a, 'f, 'i> {
@@ -37,12 +38,13 @@ impl Task<'_, '_, '_> {
     pub fn solve(&self, rounds: u32) -> Solved {
         let prior: Vec<DVec3> = self.prior.iter().map(|x| x.as_dvec3()).collect();
         let diagonal = self.rows.diagonal();
+        let normal = Normal::new(self.rows);
         // What x is beyond the prior; 1 where a value is free, 0 where it is held.
         let mut beyond = vec![DVec3::ZERO; prior.len()];
         let mut free = vec![DVec3::ONE; prior.len()];
         let mut iterations = 0;
         for round in 0..=rounds {
-            iterations += self.descend(&prior, &diagonal, &free, &mut beyond);
+            iterations += self.descend(&prior, &diagonal, normal.as_ref(), &free, &mut beyond);
             if round == rounds {
                 break;
             }
@@ -67,7 +69,14 @@ impl Task<'_, '_, '_> {
     }
 
     /// Conjugate gradients from `beyond` on, over the values that are free. Returns the iterations.
-    fn descend(&self, prior: &[DVec3], diagonal: &[f64], free: &[DVec3], beyond: &mut [DVec3]) -> u32 {
+    fn descend(
+        &self,
+        prior: &[DVec3],
+        diagonal: &[f64],
+        normal: Option<&Normal>,
+        free: &[DVec3],
+        beyond: &mut [DVec3],
+    ) -> u32 {
         let rows = self.rows;
         let steepness: Vec<f64> = diagonal.iter().map(|d| 1.0 / (d + self.lambda)).collect();
         let x: Vec<DVec3> = prior.iter().zip(beyond.iter()).map(|(a, b)| *a + *b).collect();
@@ -84,8 +93,10 @@ impl Task<'_, '_, '_> {
         let enough = slope * (TOLERANCE * TOLERANCE);
         let mut done = 0;
         while done < self.iterations && slope.cmpgt(enough).any() {
-            let seen = rows.times(&step);
-            let mut image = rows.transposed_times(&seen);
+            let mut image = match normal {
+                Some(normal) => normal.times(&step),
+                None => rows.transposed_times(&rows.times(&step)),
+            };
             for i in columns() {
                 image[i] = (image[i] + step[i] * self.lambda) * free[i];
             }

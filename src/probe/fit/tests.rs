@@ -196,6 +196,28 @@ fn the_prior_rules_what_no_row_asks_for_and_all_where_lambda_is_large() {
 }
 
 #[test]
+fn blocks_are_the_rows_times_themselves() {
+    for (store, has) in [(harmonics(None, true), true), (octahedral(4), true), (octahedral(5), false)] {
+        let volume = volume(&store);
+        let unknowns = volume.irradiance.fitted_unknowns();
+        let rows = rows_of(&volume, 500, |x, _| x);
+        let factors = volume.irradiance.factors();
+        let rows = Rows::new(&factors, 27, unknowns, rows.into_iter());
+        let Some(normal) = normal::Normal::new(&rows) else {
+            assert!(!has);
+            continue;
+        };
+        let x: Vec<DVec3> = (0..27 * unknowns as u64).map(|i| direction(&mut random(i)).as_dvec3()).collect();
+        let expected = rows.transposed_times(&rows.times(&x));
+        let largest = expected.iter().map(|e| e.abs().max_element()).fold(0.0, f64::max);
+        for (found, expected) in normal.times(&x).iter().zip(&expected) {
+            // Products of shares and factors are rounded to f32, some hundred a sum.
+            assert!((*found - *expected).abs().max_element() < 1e-6 * largest, "{found} {expected}");
+        }
+    }
+}
+
+#[test]
 fn conjugate_gradients_reach_the_dense_solution() {
     let volume = volume(&octahedral(2));
     let rows = rows_of(&volume, 400, |x, n| Vec3::new(1.0 + n.z, x.x.sin(), 3.0 * n.y * x.z));

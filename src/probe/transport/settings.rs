@@ -102,7 +102,7 @@ pub struct InOrderSettings {
 
 impl Default for InOrderSettings {
     fn default() -> Self {
-        InOrderSettings { tolerance: 1e-3, most: 256 }
+        InOrderSettings { tolerance: 1e-3, most: 1024 }
     }
 }
 

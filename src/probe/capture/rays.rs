@@ -69,12 +69,12 @@ pub struct OctahedralRays {
 }
 
 impl Default for OctahedralRays {
-    /// Deviation of a probe's mean irradiance between twelve seeds, mean over lit probes, and seconds on two cores: office at 2 m
-    /// without guided rays 13.5 %, 1.00 s; 24² texels and 2 guided rays 2.4 %, 1.06 s; 32² and 1 2.0 %, 1.15 s; 32² and 1.5 1.6 %,
-    /// 1.2 s; 32² and 2 1.4 %. Other scenes (two_rooms_open 1 m, courtyard 2 m, thin_wall 0.75 m), 32² and 1 against none:
-    /// 0.6, 0.5 and 7 % against 1.5, 1.1 and 17 %.
+    /// Deviation of a probe's mean irradiance between twelve seeds, mean over lit probes, and time against that without guided
+    /// rays and before: office at 2 m 13.5 % without; 24² texels and 2 guided rays 2.4 %, 1.01 ×; 32² and 1 2.0 %, 1.03 ×; 32²
+    /// and 1.5 1.6 %, 1.2 ×. two_rooms_open 1 m, courtyard 2 m, thin_wall 0.75 m, 32² and 1 against none: 0.6, 0.5 and 7 %
+    /// against 1.5, 1.1 and 17 %.
     fn default() -> Self {
-        OctahedralRays { resolution: 32, per_texel: 1, guided: 1.5 }
+        OctahedralRays { resolution: 32, per_texel: 1, guided: 1.0 }
     }
 }
 

@@ -85,7 +85,7 @@ fn bake_reports() {
         let rate = (number("rays.primary") + number("rays.shadow")) / number("time_s.capture");
         // The same two f64 divided.
         assert!((number("rays_per_s") / rate - 1.0).abs() < 1e-9);
-        // 32² texels: one ray each of the pilot, one that is even and one that is guided, rounded by chance; unsure probes are
+        // 32² texels: one ray each of the pilot, one that is even and 1.25 that are guided, rounded by chance; unsure probes are
         // looked at again, and a probe gets no more than it may.
         let rays = number("rays.primary") / (1024.0 * number("probes_active"));
         assert!((2.2..4.5).contains(&rays), "{rays}");

@@ -7,9 +7,10 @@ source "$(dirname -- "${BASH_SOURCE[0]}")/lib.sh"
 usage="usage: scripts/stability.sh [FILE.json] [--readme | --check]
 
 Sets up, builds, runs tests/stability.rs and prints a row for every case: what is extreme, what was checked, the figure,
-its bound. Writes the rows to FILE.json (out/stability.json where not given).
+its bound. Writes the rows to FILE.json (out/stability.json where not given), and the table of the methods to
+stability/methods.md beside it.
 
-  --readme  also remakes the README's shortened table
+  --readme  also remakes the README's shortened table and tests/stability/README.md
   --check   also fails when the README's table lacks a case, has one too many or names another bound; figures may differ
 
 Exits 0 when all cases hold, 1 when one does not."

@@ -97,7 +97,7 @@ def curves(scene):
     entries = []
     for preset in PRESETS:
         own = spacing_of(scene)
-        values = [s for s in SCENES[scene].get("curve", []) if s >= own or preset not in LARGE]
+        values = [s for s in SCENES[scene].get("curve", []) if s > own or preset not in LARGE]
         if values:
             axes = f', axes: [(key: "grid.spacing_m", values: {values})]'
             entries.append(ladder(scene, "curves", preset, preset, [], axes))

@@ -60,7 +60,8 @@ def rooms_table():
             lines.append(cells)
         if lines:
             report, _ = room(scene, "default", "lit")
-            threads = f"{report['threads']} threads" if report else "one machine"
+            count = report["threads"] if report else 0
+            threads = "one thread" if count == 1 else f"{count} threads" if count else "one machine"
             blocks.append(f"**{scene}**, 4 × 2 × 2 probes; times of {threads}.\n\n{markdown(head, lines)}")
     if not blocks:
         return "Nothing was run."

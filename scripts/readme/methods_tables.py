@@ -172,7 +172,9 @@ def at_budgets(scenes):
             least = min((error for error in errors if error is not None), default=None)
             texts = [percent(error) for error in errors]
             marked = [f"**{t}**" if e is not None and e == least else t for e, t in zip(errors, texts)]
-            rows.append([size(budget["bytes"]), *marked])
+            # More bytes than any method needs say nothing more.
+            if not rows or rows[-1][1:] != marked:
+                rows.append([size(budget["bytes"]), *marked])
         head = ["bytes in all", *(f"`{entry['method']}`" for entry in budgets[0]["entries"])]
         blocks.append(f"**{scene}**. {caption(scene, report)}\n\n{markdown(head, rows)}")
     return "\n\n".join(blocks) if blocks else "Nothing was run."

@@ -1,14 +1,17 @@
 #!/usr/bin/env python3
 """Prints the table of a stability run, ends with one line, and exits 1 when a case does not hold.
 
---readme writes the shortened table between the README's markers; --check compares it, digits of figures apart.
+--readme writes the shortened table between the README's markers, and the table of the methods to tests/stability;
+--check compares the former, digits of figures apart. The table of the methods is always written beside the run's JSON.
 """
 import json
 import pathlib
 import re
 import sys
 
-README = pathlib.Path(__file__).resolve().parents[2] / "README.md"
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+README = ROOT / "README.md"
+METHODS = ROOT / "tests" / "stability" / "README.md"
 BEGIN, END = "<!-- stability: begin -->", "<!-- stability: end -->"
 
 
@@ -56,6 +59,46 @@ def shortened(cases):
     return lines
 
 
+METHODS_HEAD = """# Where the methods' numbers could break
+
+Written by `scripts/stability.sh --readme`; the rows, their bounds and the reasons of these stand in `methods.rs`. Captures are
+scaled down for speed, all else is each preset's own: rays through cube faces of 16² texels (`threev8-*`) or of 32² resampled
+to 16² (`irradiance-2022`, `lightfield-2022`), maps of 16² texels (`default`, `path`), 8 paths from every hit (`path`).
+
+`× 10⁻³`, `× 10³`: two rooms of 8 m with a door and a lamp, at that scale against scale 1; the relative difference of the mean
+of a picture. At `× 10³` most distances are beyond 255.9 m, whose square is the largest that f16 holds. Every other row is a
+closed furnace of emission 1, and the share of its light, πLe/(1 − ρ), that a picture of its wall shows: with 8 probes
+at the albedos 0.99 and 0.999; at albedo 1/2 with one probe (one base cell), 1 × 1 × 5 probes, and 4³ probes of which 56 stand
+behind the walls and one in a block. Beside each figure how the bake ended. In no run was a value of files, pictures or
+reports not finite, and none found more light than there is, but for rounding and the noise of paths.
+"""
+
+
+def methods_table(cases):
+    """Markdown: a row for each extreme, a column for each method, and what is by design below."""
+    names, extremes, cells, designs = [], [], {}, {}
+    for case in cases:
+        if case["group"] != "method" or case["checked"].endswith("at least"):
+            continue
+        method, extreme = case["name"].split(" · ", 1)
+        note, _, why = case["note"].partition("; by design: ")
+        names += [method] if method not in names else []
+        extremes += [extreme] if extreme not in extremes else []
+        mark = "" if all(c["holds"] for c in cases if c["name"] == case["name"]) else " **FAILS**"
+        cells[extreme, method] = f"{number(case['figure'])}{'*' if why else ''}{mark} ({note})"
+        if why and why not in designs.setdefault(method, {}):
+            designs[method][why] = []
+        if why:
+            designs[method][why].append(extreme)
+    lines = ["| extreme | " + " | ".join(f"`{name}`" for name in names) + " |", "|---" * (len(names) + 1) + "|"]
+    for extreme in extremes:
+        lines.append(f"| {extreme} | " + " | ".join(cells.get((extreme, name), "") for name in names) + " |")
+    lines += ["", "\\* less than all the light, by design of the method:", ""]
+    for method, whys in designs.items():
+        lines += [f"* `{method}`, {', '.join(extremes)}: {why}" for why, extremes in whys.items()]
+    return METHODS_HEAD + "\n" + "\n".join(lines) + "\n"
+
+
 def without_figures(lines):
     """All but the worst figures, which differ from machine to machine."""
     return [[cell for i, cell in enumerate(line.split("|")) if i != 4] for line in lines]
@@ -66,6 +109,10 @@ def main(path, option=None):
     print_table([["extreme", "case", "checked", "figure", "bound", ""]] + [columns(case) for case in cases])
     holding = sum(case["holds"] for case in cases)
     failed = holding != len(cases)
+    methods = methods_table(cases)
+    beside = pathlib.Path(path).parent / "stability" / "methods.md"
+    beside.parent.mkdir(parents=True, exist_ok=True)
+    beside.write_text(methods, encoding="utf-8")
     text = README.read_text(encoding="utf-8")
     before, _, rest = text.partition(BEGIN)
     block, _, after = rest.partition(END)
@@ -73,6 +120,7 @@ def main(path, option=None):
         sys.exit(f"error: {README.name} has no {BEGIN} … {END}")
     table = shortened(cases)
     if option == "--readme":
+        METHODS.write_text(methods, encoding="utf-8")
         README.write_text(before + BEGIN + "\n" + "\n".join(table) + "\n" + END + after, encoding="utf-8")
     if option == "--check" and without_figures(block.strip().splitlines()) != without_figures(table):
         print("README.md: its table of stability is not that of this run; run scripts/stability.sh --readme")

@@ -23,7 +23,8 @@ pub enum BakeError {
 #[derive(Debug, Clone)]
 pub struct Circumstances {
     pub seed: u64,
-    /// Most bytes of captures kept in memory; the rest is traced again for every bounce, with the same result.
+    /// Most bytes of captures kept in memory, with the rows that are worked out of them; the rest is traced again for every
+    /// bounce, with the same result.
     pub memory_budget_bytes: Option<u64>,
     pub progress: Progress,
     /// Where iterations are saved while a long bake runs, and whether to go on from there.

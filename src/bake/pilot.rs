@@ -12,7 +12,7 @@ use crate::probe::capture::guide::{Guide, Pilot};
 use crate::probe::capture::{Capture, CaptureSettings, ProbeCapture};
 use crate::probe::lattice::ProbeState;
 use crate::probe::store::Occlusion;
-use crate::probe::transport::operator::{Captures, Operator, store};
+use crate::probe::transport::operator::{Captures, Masks, Operator, store};
 use crate::probe::{ProbeIndex, Volume};
 use crate::system::progress::Progress;
 
@@ -43,16 +43,18 @@ impl Prepared<'_, '_> {
             query: &self.config.query,
             gathers_emission: self.config.capture.gathers_emission(),
         };
-        own.time(|times| &mut times.bounces, || solve_roughly(&operator, bounces, &mut volume));
+        let masks = own.time(|times| &mut times.bounces, || solve_roughly(&operator, bounces, &mut volume));
         let solid_angles: Vec<f32> =
             self.capture.rays.directions().texel_means().into_iter().map(|(_, angle)| angle).collect();
-        let read = |p: usize, capture: &ProbeCapture| {
-            let radiance = operator.outgoing(&volume, p, capture, |_| Some(0), true).0;
+        // What surfels see of their probes need not be looked up where that is known.
+        let read = |p: usize, capture: &ProbeCapture, masks: &[u8]| {
+            let mask = |i: usize| Some(masks.get(i).copied().unwrap_or(0));
+            let radiance = operator.outgoing(&volume, p, capture, mask, true).0;
             (self.grid.stream(ProbeIndex(p as u32)) as usize, Pilot::new(&radiance, &solid_angles, side))
         };
         let is_active = |p: usize| self.placement.states[p] == ProbeState::Active;
         let read_all = || {
-            let of_probe = |p: usize| is_active(p).then(|| captures.with(p, |capture| read(p, capture)));
+            let of_probe = |p: usize| is_active(p).then(|| captures.with(p, |capture| read(p, capture, masks.of(p))));
             (0..self.grid.probe_count()).into_par_iter().map(of_probe).collect::<Vec<_>>()
         };
         let mut pilots = own.time(|times| &mut times.bounces, read_all);
@@ -62,7 +64,7 @@ impl Prepared<'_, '_> {
         let again = Capture { guide: Some(&first), purpose: Purpose::SecondPilot, ..capture };
         let look_again = |&p: &usize| {
             let capture = self.trace(&again, p);
-            (p, read(p, &capture), capture.rays)
+            (p, read(p, &capture, &[]), capture.rays)
         };
         let second: Vec<(usize, (usize, Pilot), RayCount)> =
             own.time(|times| &mut times.capture, || unsure.par_iter().map(look_again).collect());
@@ -79,8 +81,8 @@ impl Prepared<'_, '_> {
     }
 }
 
-/// A few plain bounces.
-fn solve_roughly<C: Captures>(operator: &Operator<C>, bounces: u32, volume: &mut Volume) {
+/// A few plain bounces; what surfels see of their probes.
+fn solve_roughly<C: Captures>(operator: &Operator<C>, bounces: u32, volume: &mut Volume) -> Masks {
     let direct = operator.apply(volume, None).0;
     store(volume, &direct);
     let masks = operator.masks(volume);
@@ -88,4 +90,5 @@ fn solve_roughly<C: Captures>(operator: &Operator<C>, bounces: u32, volume: &mut
         let next = operator.apply(volume, Some(&masks)).0;
         store(volume, &next);
     }
+    masks
 }

@@ -103,7 +103,7 @@ impl Axes {
         };
         let are_axes = matches!(x, "+X" | "-X") && matches!(y, "+Y" | "-Y");
         let axes = Axes { width, height, is_transposed, is_right_to_left: x == "-X", is_upwards: y == "+Y" };
-        are_axes.then_some(axes)
+        (are_axes && width > 0 && height > 0).then_some(axes)
     }
 
     /// Number of scan lines, and pixels in each.
@@ -237,7 +237,16 @@ mod tests {
             assert_eq!(axes.stored_at(1, 0), expected, "{line}");
         }
         assert_eq!(Axes::parse("-Y 2 -X 3").unwrap().stored_at(0, 0), (0, 2));
-        for bad in ["-Y 2", "-Y 2 +Y 3", "Y 2 X 3", "-Y 2 +X 3 1", "-Y -2 +X 3", "-Y 2 +X 99999999999"] {
+        for bad in [
+            "-Y 2",
+            "-Y 2 +Y 3",
+            "Y 2 X 3",
+            "-Y 2 +X 3 1",
+            "-Y -2 +X 3",
+            "-Y 0 +X 3",
+            "-Y 2 +X 0",
+            "-Y 2 +X 99999999999",
+        ] {
             assert_eq!(Axes::parse(bad), None, "{bad}");
         }
     }

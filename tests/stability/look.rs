@@ -12,7 +12,7 @@ use lightprobe::scene::{self, LoadOptions, Scene};
 use serde_json::Value;
 
 use crate::common::{Folder, Gltf};
-use crate::probe_file::ProbeFile;
+use crate::probe_file::{ProbeFile, Tensor};
 use crate::program::{self, method};
 use crate::shapes::save;
 
@@ -46,32 +46,72 @@ const UNASKED: [&str; 15] = [
 ];
 
 /// Ratios to the light seen: `null` where there is none.
-const OF_LIGHT: [&str; 8] =
-    ["light", "dark", "blocks", "fraction", "weight", "lookup_ns", "lookup_spread_ns", "irradiance_indirect_mean"];
+const OF_LIGHT: [&str; 11] = [
+    "light",
+    "dark",
+    "blocks",
+    "fraction",
+    "weight",
+    "lookup_ns",
+    "lookup_spread_ns",
+    "irradiance_indirect_mean",
+    "outside_hull",
+    "leak_light",
+    "leak_dark",
+];
 
-/// Figures of points in the air, and of the hull: `null` where a volume without extent, or behind surfaces that show their backs, holds
-/// no such point.
-const OF_POINTS: [&str; 5] = ["black", "leak_light", "leak_dark", "outside_hull", "unseen"];
+/// Figures of points in the air: `null` where there are none, which is expected in two cases. All of a flat volume, a plane, a
+/// line or a point of probes, may lie within a wall; and a dark room that shows only backs counts as solid. Any other volume
+/// has free air in it.
+const OF_AIR: [&str; 2] = ["black", "unseen"];
+
+/// Leaks of such points: `null` also where a flat volume has points but none sees a probe. A single probe's points lie at its
+/// grid point, and it may have moved out of sight of it.
+const OF_SEEN_AIR: [&str; 2] = ["leak_light", "leak_dark"];
+
+/// What a report is of.
+#[derive(Clone, Copy)]
+struct Of {
+    /// Whether there is light.
+    lit: bool,
+    /// Whether the volume has but one layer of probes along an axis.
+    flat: bool,
+}
 
 /// Everything that could go wrong in a report, whatever the scene.
-fn check_report(report: &Value, lit: bool) {
-    fn walk(value: &Value, key: &str, lit: bool) {
+fn check_report(report: &Value, of: Of) {
+    fn walk(value: &Value, key: &str, of: Of, (airless, unseen): (bool, bool)) {
         match value {
             Value::Null => {
                 let expected = UNASKED.contains(&key)
-                    || OF_POINTS.contains(&key)
-                    || (!lit && (OF_LIGHT.contains(&key) || key == "rays_per_s"));
+                    || (airless && OF_AIR.contains(&key))
+                    || ((airless || unseen) && OF_SEEN_AIR.contains(&key))
+                    || (!of.lit && (OF_LIGHT.contains(&key) || key == "rays_per_s"));
                 assert!(expected, "the report's {key} is null");
             }
-            Value::Array(list) => list.iter().for_each(|v| walk(v, key, lit)),
-            Value::Object(map) => map.iter().for_each(|(k, v)| walk(v, k, lit)),
+            Value::Array(list) => list.iter().for_each(|v| walk(v, key, of, (airless, unseen))),
+            Value::Object(map) => {
+                let is = |key: &str, number: f64| map.get(key).is_some_and(|v| v.as_f64() == Some(number));
+                let air = ((of.flat || !of.lit) && is("points", 0.0), of.flat && is("unseen", 1.0));
+                map.iter().for_each(|(k, v)| walk(v, k, of, air));
+            }
             _ => {}
         }
     }
-    walk(report, "", lit);
+    walk(report, "", of, (false, false));
     if let Some(numerics) = report.get("numerics") {
         assert_eq!(numerics["non_finite"], 0, "{numerics}");
     }
+}
+
+fn floats(tensor: &Tensor) -> impl Iterator<Item = f32> {
+    tensor.bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b))
+}
+
+/// Whether the volume has but one layer of probes along an axis.
+fn is_flat(file: &ProbeFile) -> bool {
+    let divisions = file.grid()["divisions"].clone();
+    divisions.as_array().expect("numbers of points").iter().any(|n| *n == 1)
 }
 
 /// Every tensor's values: finite, and not negative where light and distances are.
@@ -79,13 +119,31 @@ fn check_file(file: &ProbeFile) {
     let within = |what: &str, v: f64| assert!(v.is_finite() && v >= 0.0, "{what} {v}");
     for probe in 0..file.states().len() {
         assert!(file.position(probe).iter().all(|x| x.is_finite()), "position of probe {probe}");
-        let side = file.resolution() + 2 * file.border();
-        (0..side * side).flat_map(|t| file.stored(probe, t / side, t % side)).for_each(|v| within("irradiance", v));
-        if file.tensors.contains_key("distance") {
+        if file.tensors.contains_key("irradiance") {
+            let side = file.resolution() + 2 * file.border();
+            (0..side * side).flat_map(|t| file.stored(probe, t / side, t % side)).for_each(|v| within("irradiance", v));
+        }
+        if file.tensors.contains_key("distance_scale") {
             for (_, mean, deviation) in file.distances(probe) {
                 within("distance", mean);
                 within("deviation", deviation);
             }
+        }
+    }
+    // Whatever else a method stores.
+    for (name, tensor) in &file.tensors {
+        match tensor.dtype.as_str() {
+            "F32" => assert!(floats(tensor).all(f32::is_finite), "tensor {name}"),
+            // All bits of the exponent are set in infinities and NaN only.
+            "F16" => assert!(tensor.bytes.as_chunks::<2>().0.iter().all(|b| b[1] & 0x7C != 0x7C), "tensor {name}"),
+            // The others are indices.
+            "U32" if file.metadata.contains_key(&format!("scale.{name}")) => {
+                let side = tensor.shape[1];
+                let texels = (0..tensor.shape[0]).flat_map(|p| (0..side * side).map(move |t| (p, t)));
+                let colors = texels.flat_map(|(p, t)| file.color(name, p, t / side, t % side));
+                colors.for_each(|v| within(name, v));
+            }
+            _ => {}
         }
     }
 }
@@ -120,7 +178,8 @@ pub fn bake_dark(gltf: Gltf, words: &str) -> Baked {
 /// Bakes a scene that lies in a folder.
 pub fn bake_file(folder: Folder, scene: PathBuf, words: &str, lit: bool) -> Baked {
     let program::Bake { path, file, report, .. } = program::bake(&folder, &scene, words);
-    check_report(&report, lit);
+    let flat = is_flat(&file);
+    check_report(&report, Of { lit, flat });
     check_file(&file);
     Baked { folder, scene, path, file, report }
 }
@@ -146,7 +205,7 @@ impl Baked {
         let name = blake3::hash(words.as_bytes()).to_hex()[..16].to_owned();
         let report = program::render(&self.folder, &self.scene, &self.path, &name, &format!("--size 64x36 {words}"));
         let pictures = self.folder.path().join(name);
-        check_report(&report, lit);
+        check_report(&report, Of { lit, flat: is_flat(&self.file) });
         check_pictures(&pictures);
         Seen { report, pictures }
     }

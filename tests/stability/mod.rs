@@ -9,6 +9,7 @@ mod lights;
 mod look;
 mod materials;
 mod meshes;
+mod methods;
 mod moments;
 mod rooms;
 mod scales;
@@ -31,6 +32,7 @@ pub fn cases() -> Vec<Case> {
         meshes::cases(),
         materials::cases(),
         moments::cases(),
+        methods::cases(),
     ]
     .into_iter()
     .flatten()

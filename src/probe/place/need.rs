@@ -5,6 +5,9 @@
 //! surface within its own cells; what still is not seen afterwards need not be baked. Surfaces that see none of their
 //! eight probes even then are given one from the cells around.
 
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -66,7 +69,8 @@ pub fn relocate(
         }
         let margin = settings.voxel_margin;
         let unseen = table.entries(cell).filter(|entry| entry.mask == 0);
-        unseen.map(|entry| need(settler.world, grid, table, cell, &entry, margin)).collect()
+        let unseen: Vec<Entry> = unseen.collect();
+        unseen.par_iter().map(|entry| need(settler.world, grid, table, cell, entry, margin)).collect()
     };
     let needs: Vec<Vec<Need>> = (0..grid.cell_count() as u32).into_par_iter().map(needs_of_cell).collect();
     let moves: Vec<(usize, Vec3)> = (0..grid.probe_count())
@@ -134,8 +138,9 @@ pub fn far_probes(
         let is_active = |probe: &ProbeIndex| placement.states[probe.0 as usize] == ProbeState::Active;
         let rings: Vec<Vec<ProbeIndex>> =
             (1..=settings.far_rings).map(|ring| grid.ring(cell, ring).filter(is_active).collect()).collect();
+        // Some cells have most of them: their entries are work for all threads.
         in_need
-            .iter()
+            .par_iter()
             .filter_map(|entry| {
                 let need = need(world, grid, table, cell, entry, settings.voxel_margin);
                 let seen =
@@ -157,12 +162,14 @@ fn nearest_visible(
     need: &Need,
 ) -> Option<ProbeIndex> {
     let position = |probe: ProbeIndex| placement.positions[probe.0 as usize];
-    let distance = |probe: ProbeIndex| position(probe).distance_squared(need.point);
-    let mut before: Vec<ProbeIndex> =
-        probes.iter().copied().filter(|&p| (position(p) - need.point).dot(need.normal) > 0.0).collect();
-    before.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)).then(a.cmp(&b)));
+    // Bits of numbers that are not negative are in their order.
+    let distance = |probe: ProbeIndex| position(probe).distance_squared(need.point).to_bits();
+    let before = probes.iter().copied().filter(|&p| (position(p) - need.point).dot(need.normal) > 0.0);
+    let mut nearest: BinaryHeap<Reverse<(u32, ProbeIndex)>> = before.map(|p| Reverse((distance(p), p))).collect();
     let start = |p: ProbeIndex| contacts.of(p.0 as usize).map_or(position(p), |contact| contact.target(need.point));
-    before.into_iter().find(|&p| !tracer.occluded(Ray::segment(start(p), need.point, 0)))
+    std::iter::from_fn(|| nearest.pop())
+        .map(|Reverse((_, probe))| probe)
+        .find(|&p| !tracer.occluded(Ray::segment(start(p), need.point, 0)))
 }
 
 /// A place from which the surface can be seen; `None` where its surroundings are the inside of something.

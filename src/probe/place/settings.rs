@@ -2,7 +2,8 @@
 //!
 //! Where a constant has no source, its doc says what other values change: of `leak.light` and `leak.dark`, as shares of the
 //! light, of `leak.unseen`, or of the survey's rays, over two_rooms_open 1 m, office 1.5 m, courtyard 2 m, thin_wall 0.75 m,
-//! cornell 0.25 m and glossy_room 0.75 m. Changes below 1e-4 count as none.
+//! cornell 0.25 m and glossy_room 0.75 m. Changes below 1e-4 count as none. Those of the
+//! survey's points were measured when every triangle had points of its own; now all surfaces of a voxel's side share them.
 
 use serde::{Deserialize, Serialize};
 

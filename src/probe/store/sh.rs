@@ -162,12 +162,12 @@ impl ShIrradiance {
 
     /// What a look-up takes of the unknowns, by its direction.
     pub fn shares(&self) -> Shares {
-        let maps = |maps: &OctahedralMaps<Vec3A>| {
+        let maps = |(maps, functions): (&OctahedralMaps<Vec3A>, Vec<Functions>)| {
             let mut table = OctahedralMaps::new(1, maps.resolution, BORDER, Functions([0.0; COUNT]));
-            fill_with_border(&texel_functions(maps.resolution), maps.resolution, BORDER, table.probe_mut(0));
+            table.probe_mut(0).copy_from_slice(&functions);
             table
         };
-        Shares { presampled: self.presampled.as_ref().map(maps) }
+        Shares { presampled: self.presampled().map(maps) }
     }
 
     /// One of a probe's unknowns, W·m⁻².

@@ -102,7 +102,7 @@ pub struct InOrderSettings {
 
 impl Default for InOrderSettings {
     fn default() -> Self {
-        InOrderSettings { tolerance: 1e-3, most: 256 }
+        InOrderSettings { tolerance: 1e-3, most: 1024 }
     }
 }
 
@@ -126,8 +126,8 @@ impl Default for BounceSettings {
 /// Iterations that combining them takes at most, by and large: 4 to 8 in the scenes of the project, 12 for stiff ones.
 const ACCELERATED_ITERATIONS: u32 = 12;
 
-/// Bounces of a rough solution: at an albedo of a half what is missing is an eighth.
-const ROUGH_BOUNCES: u32 = 3;
+/// Bounces of a rough solution; where it is read another is added.
+const ROUGH_BOUNCES: u32 = 2;
 
 impl BounceSettings {
     /// Whether differences of iterates are worth keeping.

@@ -190,7 +190,7 @@ fn wrong_tensors_under_right_hashes() {
     refused("", Box::new(set("irradiance", 8, [0xFF; 4])));
     refused("", Box::new(set("visibility_root", 0, [0xFF; 4])));
     // A plane whose parts never begin.
-    refused("", Box::new(set("visibility_tree", 0, [0; 2])));
+    refused("", Box::new(set("visibility_tree", 0, [0; 4])));
     refused(MOMENTS, Box::new(set("distance_scale", 0, nan)));
     refused(MOMENTS, Box::new(set("distance_scale", 0, (-1f32).to_le_bytes())));
     for name in ["position", "state", "irradiance", "visibility_root", "visibility_tree"] {

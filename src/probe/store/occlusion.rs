@@ -267,14 +267,14 @@ impl Occlusion {
         }
     }
 
-    /// Mean number of probes that a surface sees, of the eight around it; `None` where that is not stored.
-    pub fn mean_visible(&self) -> Option<f64> {
-        if let Occlusion::Regions(regions) = self {
-            return Some(regions.mean_visible());
+    /// Mean number of probes that are seen, of the eight around, over all voxels and facings; `None` where that is not stored.
+    pub fn mean_visible(&self, grid: &Grid) -> Option<f64> {
+        match self {
+            Occlusion::None | Occlusion::Moments(_) | Occlusion::Tiles(_) => None,
+            // Files of both kinds are compared.
+            Occlusion::Surface(table) => Some(Regions::new(grid, table).mean_visible()),
+            Occlusion::Regions(regions) => Some(regions.mean_visible()),
         }
-        let Occlusion::Surface(table) = self else { return None };
-        let bits: u64 = table.masks.iter().map(|mask| u64::from(mask.count_ones())).sum();
-        Some(bits as f64 / table.masks.len().max(1) as f64)
     }
 
     /// Name and size in words.

@@ -121,19 +121,25 @@ impl Regions {
         parts
     }
 
-    /// Mean number of probes seen, over all voxels and facings.
+    /// Mean number of probes seen, over all voxels and facings of all cells.
     pub fn mean_visible(&self) -> f64 {
-        let n = self.voxels_per_cell;
-        let of_cell = |&root: &u32| -> u64 {
-            let places = (0..n.pow(3)).flat_map(|v| Facing::all().map(move |facing| (v, facing)));
-            let seen = |(v, facing)| {
-                let voxel = UVec3::new(v % n, v / n % n, v / (n * n));
-                u64::from(self.mask(self.leaf(root as usize, voxel, facing)).count_ones())
-            };
-            places.map(seen).sum()
-        };
-        let all = self.roots.len() as u64 * u64::from(n.pow(3)) * 6;
-        self.roots.par_iter().map(of_cell).sum::<u64>() as f64 / all.max(1) as f64
+        let whole = Part::whole(self.voxels_per_cell);
+        let mut known: HashMap<u32, u64> = HashMap::new();
+        let of_cell = |&root: &u32| *known.entry(root).or_insert_with(|| self.seen(root as usize, whole));
+        let seen: u64 = self.roots.iter().map(of_cell).sum();
+        seen as f64 / (self.roots.len() as u64 * whole.places()).max(1) as f64
+    }
+
+    /// Number of probes seen, summed over the places of a part.
+    fn seen(&self, i: usize, part: Part) -> u64 {
+        let word = self.words[i];
+        if word & LEAF != 0 {
+            return part.places() * u64::from(self.mask(i).count_ones());
+        }
+        part.divided(word).map_or(0, |[below, beyond]| {
+            let begins = i + distance(word, || number(&self.words[i + 1..]));
+            self.seen(i + length(word), below) + self.seen(begins, beyond)
+        })
     }
 
     /// Bytes of its tensors.
@@ -155,6 +161,42 @@ fn words_of(number: u32) -> [u16; NUMBER] {
 fn length(word: u16) -> usize {
     let has_number = if word & LEAF != 0 { word & FAR != 0 } else { word & LOW == 0 };
     1 + if has_number { NUMBER } else { 0 }
+}
+
+/// Words from one that divides to the part at and beyond its threshold. `number` is that of the words behind it.
+fn distance(word: u16, number: impl FnOnce() -> u32) -> usize {
+    match word & LOW {
+        0 => number() as usize,
+        distance => usize::from(distance),
+    }
+}
+
+/// A box of voxels and facings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Part {
+    low: [u8; 4],
+    /// One beyond the last.
+    high: [u8; 4],
+}
+
+impl Part {
+    /// A cell.
+    fn whole(voxels_per_cell: u32) -> Part {
+        let n = voxels_per_cell as u8;
+        Part { low: [0; 4], high: [n, n, n, Facing::COUNT] }
+    }
+
+    /// Below and beyond the plane of a word; `None` where the plane does not divide the box.
+    fn divided(self, word: u16) -> Option<[Part; 2]> {
+        let (axis, threshold) = (usize::from(word >> AXIS_SHIFT), (word >> THRESHOLD_SHIFT & 31) as u8);
+        let (mut below, mut beyond) = (self, self);
+        (below.high[axis], beyond.low[axis]) = (threshold, threshold);
+        (self.low[axis] < threshold && threshold < self.high[axis]).then_some([below, beyond])
+    }
+
+    fn places(self) -> u64 {
+        (0..4).map(|axis| u64::from(self.high[axis] - self.low[axis])).product()
+    }
 }
 
 /// Names in the file.
@@ -186,40 +228,47 @@ pub fn read(container: &Container, grid: &Grid) -> Result<Regions, String> {
     }
     let words: Vec<u16> = container.tensor(TREES, &[Dtype::U16], &[None])?.u16s().collect();
     let roots: Vec<u32> = container.tensor(ROOTS, &[Dtype::U32], &[Some(grid.cell_count())])?.u32s().collect();
-    let firsts = firsts(&words, grid.probe_count()).ok_or_else(|| format!("tensor '{TREES}' holds no trees"))?;
+    let firsts = firsts(&words, voxels_per_cell, grid.probe_count())
+        .map_err(|word| format!("tensor '{TREES}' holds no tree at word {word}"))?;
     if roots.iter().any(|root| firsts.binary_search(root).is_err()) {
         return Err(format!("tensor '{ROOTS}' names words of '{TREES}' at which no tree begins"));
     }
     Ok(Regions { voxels_per_cell, roots, words })
 }
 
-/// Where each of the trees begins that the words are, one after another; `None` where they are none, or name a probe that
-/// does not exist.
-fn firsts(words: &[u16], probes: usize) -> Option<Vec<u32>> {
+/// Where each of the trees begins that the words are, one after another. Parts follow one another without gaps, and each plane
+/// divides its part, so that no path comes back to where it was or is longer than a cell has planes.
+///
+/// # Errors
+/// The first word that does not fit in, or names a probe that does not exist.
+fn firsts(words: &[u16], voxels_per_cell: u32, probes: usize) -> Result<Vec<u32>, usize> {
+    let whole = Part::whole(voxels_per_cell);
     let mut firsts = Vec::new();
     // Where the parts at and beyond the thresholds have to begin.
-    let mut expected: Vec<usize> = Vec::new();
-    let (mut i, mut is_first) = (0, true);
+    let mut expected: Vec<(usize, Part)> = Vec::new();
+    let (mut i, mut part, mut is_first) = (0, whole, true);
     while let Some(&word) = words.get(i) {
         if is_first {
             firsts.push(i as u32);
+            is_first = false;
         }
         let end = i + length(word);
-        let number = if end > i + 1 { Some(number(words.get(i + 1..end)?)) } else { None };
-        is_first = false;
+        let behind = words.get(i + 1..end).ok_or(i)?;
         if word & LEAF == 0 {
-            expected.push(i + number.map_or(usize::from(word & LOW), |n| n as usize));
+            let [below, beyond] = part.divided(word).ok_or(i)?;
+            expected.push((i + distance(word, || number(behind)), beyond));
+            part = below;
         } else {
-            if number.is_some_and(|probe| probe as usize >= probes || word & LOW != 0) {
-                return None;
+            if !behind.is_empty() && (number(behind) as usize >= probes || word & LOW != 0) {
+                return Err(i);
             }
             match expected.pop() {
-                Some(expected) if expected != end => return None,
-                Some(_) => {}
-                None => is_first = true,
+                Some((begins, _)) if begins != end => return Err(end),
+                Some((_, beyond)) => part = beyond,
+                None => (part, is_first) = (whole, true),
             }
         }
         i = end;
     }
-    (is_first && i == words.len()).then_some(firsts)
+    if is_first { Ok(firsts) } else { Err(i) }
 }

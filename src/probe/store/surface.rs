@@ -225,6 +225,8 @@ pub fn voxel_of_key(key: u16, n: u32) -> UVec3 {
 pub struct Facing(u8);
 
 impl Facing {
+    pub const COUNT: u8 = 6;
+
     pub fn of(normal: Vec3) -> Facing {
         let axis = normal.abs().max_position();
         Facing(2 * axis as u8 + u8::from(normal[axis] < 0.0))
@@ -235,7 +237,7 @@ impl Facing {
     }
 
     pub fn all() -> impl Iterator<Item = Facing> {
-        (0..6).map(Facing)
+        (0..Facing::COUNT).map(Facing)
     }
 
     #[inline]

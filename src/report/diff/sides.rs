@@ -194,7 +194,7 @@ fn report_of_probes(path: &Path) -> Result<Value, DiffError> {
             "border": file.border,
             "resolution": fineness.resolution,
             "visibility": volume.occlusion.rank(),
-            "visible": volume.occlusion.mean_visible(),
+            "visible": volume.occlusion.mean_visible(&volume.grid),
         },
     }))
 }

@@ -161,7 +161,9 @@ class Probes:
         own = part(voxel)
         mask = int(words[own]) & 255
         if mask == 0:
-            mask = self.beside(voxel, fraction, n, lambda v: int(words[part(v)]) & 255)
+            # Only what surfaces see there counts.
+            mask_of = lambda v: 0 if (word := int(words[part(v)])) & 1 << 13 else word & 255
+            mask = self.beside(voxel, fraction, n, mask_of)
         far = mask == 0 and int(words[own]) & 1 << 14
         return mask, number(own + 1) if far else None
 

@@ -4,11 +4,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::rows::Rows;
-
-/// Unknowns of a probe up to which blocks are small beside the rows: those of harmonics with a gradient are 12. Maps have
-/// many more, of which a row asks four.
-pub const MOST_UNKNOWNS: usize = 16;
+use super::rows::{MOST_UNKNOWNS, Rows};
 
 /// Probes that a block names: this one, and those of the cells around it with a higher number.
 const BLOCKS_PER_PROBE: u64 = 14;

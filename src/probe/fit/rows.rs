@@ -4,11 +4,14 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::normal::MOST_UNKNOWNS;
 use super::points::Asked;
 use crate::probe::Volume;
 use crate::probe::query::{Part, Query, QuerySettings};
 use crate::probe::store::irradiance::Factors;
+
+/// Unknowns of a probe up to which blocks of the normal equations are small beside the rows: those of harmonics with a gradient are 12. Maps have
+/// many more, of which a row asks four.
+pub const MOST_UNKNOWNS: usize = 16;
 
 /// One point's look-up, what it should give and how much that counts.
 #[derive(Debug, Clone)]

@@ -1,9 +1,16 @@
-//! Where things may move through a scene.
+//! Where things may move through a scene, and what they see there.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
+use super::placement::Placement;
 use crate::light::World;
+use crate::light::contact::Contacts;
 use crate::probe::lattice::Grid;
+use crate::probe::lattice::grid::CellIndex;
+use crate::probe::store::regions::air_places;
+use crate::probe::store::surface::{SurfaceVisibility, active_corners};
+use crate::trace::Ray;
 
 /// The box of free air, relative to the scene's origin: that of the scene as far as the probes' hull covers it. What the
 /// hull has beyond is no air that anything moves through, and grids that cover the scene have the same box. Along axes
@@ -20,4 +27,30 @@ pub fn bounds(world: &World, grid: &Grid) -> (Vec3, Vec3) {
         }
     }
     (low, high)
+}
+
+/// Which of their cell's probes places in the air see, for each cell that has surfaces, and the rays that told.
+pub fn seen(world: &World, grid: &Grid, placement: &Placement, table: &SurfaceVisibility) -> (Vec<Vec<u8>>, u64) {
+    let contacts = Contacts::of_points(world.scene, &placement.positions);
+    let of_cell = |cell: u32| {
+        let cell = CellIndex(cell);
+        let active = active_corners(grid, &placement.states, cell);
+        if table.range(cell).is_empty() || active == 0 {
+            return (Vec::new(), 0);
+        }
+        let ((low, sides), probes) = (grid.cell_box(cell), grid.corners(cell));
+        let sees = |place: Vec3, corner: usize| {
+            let (probe, place) = (probes[corner].0 as usize, low + place * sides);
+            let position = placement.positions[probe];
+            let start = contacts.of(probe).map_or(position, |contact| contact.target(place));
+            active >> corner & 1 == 1 && !world.tracer.occluded(Ray::segment(start, place, 0))
+        };
+        let mask = |place| (0..8).fold(0, |mask, corner| mask | u8::from(sees(place, corner)) << corner);
+        let masks: Vec<u8> = air_places(table.voxels_per_cell).map(mask).collect();
+        let rays = masks.len() as u64 * u64::from(active.count_ones());
+        (masks, rays)
+    };
+    let found: Vec<(Vec<u8>, u64)> = (0..grid.cell_count() as u32).into_par_iter().map(of_cell).collect();
+    let rays = found.iter().map(|(_, rays)| rays).sum();
+    (found.into_iter().map(|(masks, _)| masks).collect(), rays)
 }

@@ -1,10 +1,10 @@
 //! The stage: settle → survey → need.
 
-use super::need;
 use super::placement::{Placement, PlacementTask};
 use super::settings::PlacementRule;
 use super::settle::{Settler, settle_all};
 use super::survey::Surveyor;
+use super::{air, need};
 use crate::light::World;
 use crate::probe::lattice::{Grid, ProbeState};
 use crate::probe::store::regions::Regions;
@@ -34,8 +34,10 @@ pub fn place(world: &World, task: &PlacementTask, surveying: impl FnOnce()) -> P
     // weigh nothing.
     if occlusion.keeps_survey() {
         table.far = need::far_probes(world, grid, &placement, &table, &settings.survey);
-        placement.regions = Some(Regions::new(grid, &table));
         leave_unseen(&world.scene.mesh, grid, &mut placement, &table, settings.keep_unsampled);
+        let (seen, rays) = air::seen(world, grid, &placement, &table);
+        placement.rays += rays;
+        placement.regions = Some(Regions::new(grid, &table, &seen));
     }
     placement.survey = Some(table);
     placement

@@ -271,8 +271,8 @@ impl Occlusion {
     pub fn mean_visible(&self, grid: &Grid) -> Option<f64> {
         match self {
             Occlusion::None | Occlusion::Moments(_) | Occlusion::Tiles(_) => None,
-            // Files of both kinds are compared.
-            Occlusion::Surface(table) => Some(Regions::new(grid, table).mean_visible()),
+            // Files of both kinds are compared. Of the air this one knows nothing.
+            Occlusion::Surface(table) => Some(Regions::new(grid, table, &[]).mean_visible()),
             Occlusion::Regions(regions) => Some(regions.mean_visible()),
         }
     }

@@ -1,19 +1,20 @@
-//! The table of visibility at surfaces as a tree per cell: what surfaces next to one another see alike is said once.
+//! The table of visibility at surfaces as a tree per cell: what places next to one another see alike is said once.
 //!
 //! A [`SurfaceVisibility`] names the mask of every voxel and facing that has a surface. Neighbours mostly agree, so each cell
 //! is divided instead by planes between voxels, and between facings, until every part holds entries of one mask alone. What
-//! an entry answers stays the same; every other voxel and facing gets the answer of the part it lies in, so that none is
-//! without one. [`grow`] divides.
+//! an entry answers stays the same. Every other voxel and facing gets the answer of the part it lies in, so that none is
+//! without one; places in the air, from which rays tell what they see, decide about the rest of the planes. [`grow`] divides.
 //!
 //! Storage: u16 words, `roots[c]` the first of cell c's tree; cells with the same tree share it. A word below 2¹⁵ divides:
 //! bits 13–14 axis (x, y, z, facing), bits 8–12 threshold t, bits 0–7 how many words farther on the part at and beyond t
 //! begins. The part below t follows. Where 8 bits are too few they are 0, and two words with the distance (low, high) come
-//! between. A word with bit 15 ends: bits 0–7 mask. Where the mask is 0 and bit 14 is set, two words follow, low and high,
-//! of the number of a probe farther away that the surface sees.
+//! between. A word with bit 15 ends: bits 0–7 mask, bit 13 that no surface is in the part. Where the mask is 0 and bit 14 is
+//! set, two words follow, low and high, of the number of a probe farther away that the surface sees.
 
 mod grow;
 #[cfg(test)]
 mod tests;
+mod words;
 
 use std::collections::HashMap;
 
@@ -21,20 +22,11 @@ use glam::{UVec3, Vec3};
 use rayon::prelude::*;
 use safetensors::Dtype;
 
+pub use self::grow::air_places;
+use self::words::{AIR, AXIS_SHIFT, FAR, LEAF, LOW, NUMBER, Part, THRESHOLD_SHIFT, distance, length, number};
 use super::surface::{Facing, MAX_VOXELS_PER_CELL, Seen, SurfaceVisibility, beside, voxel_of};
 use crate::probe::container::Container;
 use crate::probe::lattice::grid::{Cell, CellIndex, Grid, ProbeIndex};
-
-/// Bit of a word that ends.
-const LEAF: u16 = 1 << 15;
-/// Bit of such a word that a probe farther away follows.
-const FAR: u16 = 1 << 14;
-const AXIS_SHIFT: u32 = 13;
-const THRESHOLD_SHIFT: u32 = 8;
-/// Bits of the distance, and of the mask.
-const LOW: u16 = 0xff;
-/// Words of a number of 32 bits.
-const NUMBER: usize = 2;
 
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Regions {
@@ -45,11 +37,13 @@ pub struct Regions {
 }
 
 impl Regions {
-    /// The trees of a table. Entries and their strips answer as the table does.
-    pub fn new(grid: &Grid, table: &SurfaceVisibility) -> Regions {
+    /// The trees of a table. Entries and their strips answer as the table does, the air about as `air` says: what the
+    /// [`air_places`] of each cell see, or nothing where that is not known.
+    pub fn new(grid: &Grid, table: &SurfaceVisibility, air: &[Vec<u8>]) -> Regions {
+        let air = |cell: u32| air.get(cell as usize).map_or(&[][..], Vec::as_slice);
         let trees: Vec<Vec<u16>> = (0..grid.cell_count() as u32)
             .into_par_iter()
-            .map_init(grow::Grower::default, |grower, cell| grower.tree(table, CellIndex(cell)))
+            .map_init(grow::Grower::default, |grower, cell| grower.tree(table, CellIndex(cell), air(cell)))
             .collect();
         let (mut roots, mut words) = (Vec::with_capacity(trees.len()), Vec::new());
         let mut known: HashMap<Vec<u16>, u32> = HashMap::new();
@@ -74,7 +68,7 @@ impl Regions {
         let leaf = self.leaf(root, voxel_of(fraction, n), facing);
         match self.mask(leaf) {
             0 => {
-                let beside = beside(fraction, n, strip, |voxel| self.mask(self.leaf(root, voxel, facing)));
+                let beside = beside(fraction, n, strip, |voxel| self.surface_mask(self.leaf(root, voxel, facing)));
                 Seen { mask: beside, far: if beside == 0 { self.far(leaf) } else { None } }
             }
             mask => Seen { mask, far: None },
@@ -104,6 +98,11 @@ impl Regions {
     #[inline]
     fn mask(&self, leaf: usize) -> u8 {
         (self.words[leaf] & LOW) as u8
+    }
+
+    /// What surfaces see there; 0 where there are none.
+    fn surface_mask(&self, leaf: usize) -> u8 {
+        if self.words[leaf] & AIR == 0 { self.mask(leaf) } else { 0 }
     }
 
     fn far(&self, leaf: usize) -> Option<ProbeIndex> {
@@ -148,57 +147,6 @@ impl Regions {
     }
 }
 
-/// A number of two words.
-fn number(words: &[u16]) -> u32 {
-    u32::from(words[0]) | u32::from(words[1]) << 16
-}
-
-fn words_of(number: u32) -> [u16; NUMBER] {
-    [number as u16, (number >> 16) as u16]
-}
-
-/// Words up to the next one that divides or ends.
-fn length(word: u16) -> usize {
-    let has_number = if word & LEAF != 0 { word & FAR != 0 } else { word & LOW == 0 };
-    1 + if has_number { NUMBER } else { 0 }
-}
-
-/// Words from one that divides to the part at and beyond its threshold. `number` is that of the words behind it.
-fn distance(word: u16, number: impl FnOnce() -> u32) -> usize {
-    match word & LOW {
-        0 => number() as usize,
-        distance => usize::from(distance),
-    }
-}
-
-/// A box of voxels and facings.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Part {
-    low: [u8; 4],
-    /// One beyond the last.
-    high: [u8; 4],
-}
-
-impl Part {
-    /// A cell.
-    fn whole(voxels_per_cell: u32) -> Part {
-        let n = voxels_per_cell as u8;
-        Part { low: [0; 4], high: [n, n, n, Facing::COUNT] }
-    }
-
-    /// Below and beyond the plane of a word; `None` where the plane does not divide the box.
-    fn divided(self, word: u16) -> Option<[Part; 2]> {
-        let (axis, threshold) = (usize::from(word >> AXIS_SHIFT), (word >> THRESHOLD_SHIFT & 31) as u8);
-        let (mut below, mut beyond) = (self, self);
-        (below.high[axis], beyond.low[axis]) = (threshold, threshold);
-        (self.low[axis] < threshold && threshold < self.high[axis]).then_some([below, beyond])
-    }
-
-    fn places(self) -> u64 {
-        (0..4).map(|axis| u64::from(self.high[axis] - self.low[axis])).product()
-    }
-}
-
 /// Names in the file.
 const TREES: &str = "visibility_tree";
 const ROOTS: &str = "visibility_root";
@@ -206,7 +154,7 @@ const VOXELS_KEY: &str = "visibility.voxels_per_cell";
 
 /// Whether a file holds trees.
 pub fn is_in(container: &Container) -> bool {
-    container.has(TREES)
+    container.has(TREES) || container.has(ROOTS)
 }
 
 /// Writes the trees.

@@ -273,7 +273,7 @@ const VOXELS_KEY: &str = "visibility.voxels_per_cell";
 
 /// Whether a file holds a table.
 pub fn is_in(container: &Container) -> bool {
-    container.has(MASKS)
+    [MASKS, KEYS, STARTS].into_iter().any(|name| container.has(name))
 }
 
 /// Writes the table.

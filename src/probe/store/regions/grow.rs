@@ -3,8 +3,8 @@
 
 use glam::{IVec3, UVec3, Vec3};
 
-use super::super::surface::{Entry, Facing, SurfaceVisibility};
-use super::{AXIS_SHIFT, FAR, LEAF, LOW, THRESHOLD_SHIFT, words_of};
+use super::super::surface::{Entry, Facing, SurfaceVisibility, voxel_of};
+use super::words::{AIR, AXIS_SHIFT, FAR, LEAF, LOW, NUMBER, THRESHOLD_SHIFT, words_of};
 use crate::probe::lattice::grid::CellIndex;
 
 /// What a part answers: a mask, or one of these.
@@ -20,22 +20,43 @@ struct Sample {
     /// Voxel and facing.
     at: [u8; 4],
     answer: Answer,
-    /// Whether the answer has to be exact. The others only decide between planes.
-    is_entry: bool,
+    kind: Kind,
     /// Number of the answer among those of the part that is being divided.
     number: u32,
 }
 
-/// Weights in the entropy. A surface counts more than what merely lies between surfaces: at 1 to 1 trees of two_rooms_open
-/// are a third larger.
-const ENTRY_WEIGHT: u32 = 8;
-const OTHER_WEIGHT: u32 = 1;
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    /// A surface: the answer has to be exact.
+    Entry,
+    /// No surface, beside an entry that sees nothing, which must not take this for one. The answer is that entry's.
+    Beside,
+    /// The air: the answer may be wrong where that saves words.
+    Air,
+}
 
-/// Places along an axis at which voxels without a surface are sampled.
-const OTHER_PLACES: u32 = 4;
+/// Weights in the entropy. Surfaces count more than the air between them.
+const SURFACE_WEIGHT: u32 = 8;
+const AIR_WEIGHT: u32 = 1;
 
-/// The nearest entry that faces the same way counts before all others within so many voxels, as in look-ups of the table.
-const REACH: f32 = 3.0;
+/// Most places along an axis of a cell at which the air is asked; each counts once for each facing.
+const MOST_PLACES: u32 = 4;
+
+/// Bits of masks in the air that a word of a tree has to mend, see [`grow`]. From 12 to 0 the air's leaks fall by a tenth to a
+/// half in the six scenes of [`crate::probe::place`]'s settings, for 1.2 to 1.6 times the bytes; from 12 to 48 `air.leak_dark`
+/// nearly doubles, for 0.8 to 0.95 times.
+const BITS_PER_WORD: u32 = 12;
+
+/// What a place counts, in bits, that is left none of the probes that it sees: black is worse than any other error.
+const BLACK: u32 = 32;
+
+/// Places in the air of a cell, in shares of its sides, x fastest.
+pub fn air_places(voxels_per_cell: u32) -> impl Iterator<Item = Vec3> {
+    /// Shares of the way from one place to the next: a little off the planes of round numbers that walls like.
+    const SHIFT: f32 = 0.01;
+    let n = MOST_PLACES.min(voxels_per_cell);
+    (0..n.pow(3)).map(move |i| (UVec3::new(i % n, i / n % n, i / (n * n)).as_vec3() + 0.5 + SHIFT) / n as f32)
+}
 
 /// Buffers that cells share.
 #[derive(Default)]
@@ -46,8 +67,8 @@ pub struct Grower {
 }
 
 impl Grower {
-    /// A cell's tree.
-    pub fn tree(&mut self, table: &SurfaceVisibility, cell: CellIndex) -> Vec<u16> {
+    /// A cell's tree. `air` is what each of its [`air_places`] sees, or empty.
+    pub fn tree(&mut self, table: &SurfaceVisibility, cell: CellIndex, air: &[u8]) -> Vec<u16> {
         let mut words = Vec::new();
         let entries: Vec<Entry> = table.entries(cell).collect();
         if entries.is_empty() {
@@ -60,17 +81,23 @@ impl Grower {
         self.is_known.clear();
         self.is_known.resize(n.pow(3) as usize * 6, false);
         for entry in &entries {
-            self.add(n, entry.voxel, entry.facing, answer(table, entry));
+            self.add(n, entry.voxel, entry, Kind::Entry, answer(table, entry));
         }
+        let surfaces = self.is_known.clone();
         // Where an entry sees nothing, points close to its border ask beside, but only what surfaces answer there.
         for entry in entries.iter().filter(|entry| entry.mask == 0) {
             for neighbour in neighbours(entry.voxel, n) {
-                self.add(n, neighbour, entry.facing, answer(table, entry));
+                self.add(n, neighbour, entry, Kind::Beside, answer(table, entry));
             }
         }
-        self.add_others(n, &entries);
-        let samples = &mut self.samples;
-        grow(samples, &mut words);
+        // Who sees none of the eight is inside of something, or cannot be helped.
+        for (place, &mask) in air_places(n).zip(air).filter(|(_, mask)| **mask != 0) {
+            let voxel = voxel_of(place, n);
+            for facing in Facing::all().filter(|&facing| !surfaces[Self::place(n, voxel, facing)]) {
+                self.samples.push(Sample { at: at(voxel, facing), answer: mask.into(), kind: Kind::Air, number: 0 });
+            }
+        }
+        grow(&mut self.samples, &mut words);
         words
     }
 
@@ -78,44 +105,12 @@ impl Grower {
         ((voxel.x + n * (voxel.y + n * voxel.z)) * 6) as usize + usize::from(facing.index())
     }
 
-    /// A sample that has to be exact, where there is none.
-    fn add(&mut self, n: u32, voxel: UVec3, facing: Vec3, answer: Answer) {
-        let facing = Facing::of(facing);
+    /// A sample that is not of the air, where there is none.
+    fn add(&mut self, n: u32, voxel: UVec3, entry: &Entry, kind: Kind, answer: Answer) {
+        let facing = Facing::of(entry.facing);
         let is_known = &mut self.is_known[Self::place(n, voxel, facing)];
         if !std::mem::replace(is_known, true) {
-            self.samples.push(Sample { at: at(voxel, facing), answer, is_entry: true, number: 0 });
-        }
-    }
-
-    /// Voxels between the surfaces see about what the nearest entry sees that faces them: of the same facing, or of any.
-    /// Nothing stands between the two but other surfaces that face the voxel, which are nearer.
-    fn add_others(&mut self, n: u32, entries: &[Entry]) {
-        let step = n.div_ceil(OTHER_PLACES).max(1);
-        let along = || (0..n).skip(step as usize / 2).step_by(step as usize);
-        let places = along().flat_map(|z| along().flat_map(move |y| along().map(move |x| UVec3::new(x, y, z))));
-        for voxel in places {
-            let mut own = [(f32::INFINITY, 0u8); 6];
-            let mut any = (f32::INFINITY, u8::MAX);
-            for entry in entries.iter().filter(|entry| entry.mask != 0) {
-                let way = voxel.as_vec3() - entry.voxel.as_vec3();
-                let distance = way.length_squared();
-                // Within a voxel the surface may lie on either side.
-                if way.dot(entry.facing) < -0.5 {
-                    continue;
-                }
-                let own = &mut own[usize::from(Facing::of(entry.facing).index())];
-                if distance < own.0 && distance <= REACH * REACH {
-                    *own = (distance, entry.mask);
-                }
-                if distance < any.0 {
-                    any = (distance, entry.mask);
-                }
-            }
-            for facing in Facing::all().filter(|&facing| !self.is_known[Self::place(n, voxel, facing)]) {
-                let (distance, mask) = own[usize::from(facing.index())];
-                let answer = Answer::from(if distance.is_finite() { mask } else { any.1 });
-                self.samples.push(Sample { at: at(voxel, facing), answer, is_entry: false, number: 0 });
-            }
+            self.samples.push(Sample { at: at(voxel, facing), answer, kind, number: 0 });
         }
     }
 }
@@ -140,27 +135,22 @@ fn neighbours(voxel: UVec3, n: u32) -> impl Iterator<Item = UVec3> {
     all.filter(inside).map(|v| v.as_uvec3())
 }
 
-/// Appends the tree of some samples, of which at least one has to be exact.
-fn grow(samples: &mut [Sample], words: &mut Vec<u16>) {
-    let mut entries = samples.iter().filter(|sample| sample.is_entry).map(|sample| sample.answer);
-    let first = entries.next().unwrap_or(Answer::from(u8::MAX));
-    if entries.all(|answer| answer == first) {
-        match first {
-            NOTHING => words.push(LEAF),
-            FARTHER.. => {
-                words.push(LEAF | FAR);
-                words.extend(words_of(first - FARTHER));
-            }
-            mask => words.push(LEAF | mask as u16),
-        }
-        return;
+/// Appends the tree of some samples. Parts that differ in the air alone are put together again where telling them apart mends
+/// less than [`BITS_PER_WORD`] (cost-complexity pruning: Breiman et al., *Classification and Regression Trees*, 1984).
+///
+/// Returns the bits that are wrong in the air.
+fn grow(samples: &mut [Sample], words: &mut Vec<u16>) -> u32 {
+    let end = End::of(samples);
+    if let Some(end) = end.filter(|end| end.wrong == 0) {
+        end.push(words);
+        return 0;
     }
-    let (axis, threshold) = plane(samples);
+    let (axis, threshold) = plane(samples, end.is_none());
     let below = partition(samples, |sample| sample.at[axis] < threshold);
     let (below, beyond) = samples.split_at_mut(below);
     let own = words.len();
     words.push((axis as u16) << AXIS_SHIFT | u16::from(threshold) << THRESHOLD_SHIFT);
-    grow(below, words);
+    let mut wrong = grow(below, words);
     let distance = words.len() - own;
     if distance <= usize::from(LOW) {
         words[own] |= distance as u16;
@@ -168,7 +158,76 @@ fn grow(samples: &mut [Sample], words: &mut Vec<u16>) {
         let number = words_of(distance as u32 + 2);
         words.splice(own + 1..own + 1, number);
     }
-    grow(beyond, words);
+    wrong += grow(beyond, words);
+    let Some(end) = end else { return wrong };
+    let saved = words.len() as u32 - own as u32 - end.words();
+    if end.wrong > wrong + saved * BITS_PER_WORD {
+        return wrong;
+    }
+    words.truncate(own);
+    end.push(words);
+    end.wrong
+}
+
+/// A part that is not divided.
+#[derive(Debug, Clone, Copy)]
+struct End {
+    answer: Answer,
+    has_surface: bool,
+    /// In the air, bits.
+    wrong: u32,
+}
+
+impl End {
+    /// The part of some samples: it answers as its surfaces do, and without any as most of its air. `None` where the surfaces
+    /// differ, or one sees something where there must be none.
+    fn of(samples: &[Sample]) -> Option<End> {
+        let answers = |kind: Kind| samples.iter().filter(move |s| s.kind == kind).map(|s| s.answer);
+        let mut entries = answers(Kind::Entry);
+        let beside = answers(Kind::Beside).next();
+        let entry = entries.next();
+        let answer = match entry {
+            Some(first) => {
+                let holds = entries.all(|answer| answer == first) && (beside.is_none() || mask(first) == 0);
+                holds.then_some(first)?
+            }
+            None => most(answers(Kind::Air)).or(beside)?,
+        };
+        let given = mask(answer);
+        let wrong_of = |seen: Answer| match mask(seen) {
+            seen if seen & given == 0 => BLACK,
+            seen => (seen ^ given).count_ones(),
+        };
+        Some(End { answer, has_surface: entry.is_some(), wrong: answers(Kind::Air).map(wrong_of).sum() })
+    }
+
+    fn words(&self) -> u32 {
+        if self.answer >= FARTHER { 1 + NUMBER as u32 } else { 1 }
+    }
+
+    fn push(&self, words: &mut Vec<u16>) {
+        let air = if self.has_surface { 0 } else { AIR };
+        match self.answer {
+            NOTHING => words.push(LEAF | air),
+            FARTHER.. => {
+                words.push(LEAF | FAR | air);
+                words.extend(words_of(self.answer - FARTHER));
+            }
+            mask => words.push(LEAF | air | mask as u16),
+        }
+    }
+}
+
+/// The most frequent of some masks.
+fn most(masks: impl Iterator<Item = Answer>) -> Option<Answer> {
+    let mut counts = [0u32; 256];
+    masks.for_each(|mask| counts[mask as usize & 0xff] += 1);
+    let most = (0..=u8::MAX).max_by_key(|&mask| (counts[usize::from(mask)], mask))?;
+    (counts[usize::from(most)] > 0).then_some(most.into())
+}
+
+fn mask(answer: Answer) -> u8 {
+    if answer < NOTHING { answer as u8 } else { 0 }
 }
 
 /// Moves those that hold to the front; returns how many these are.
@@ -183,8 +242,8 @@ fn partition(samples: &mut [Sample], holds: impl Fn(&Sample) -> bool) -> usize {
     count
 }
 
-/// Axis and threshold that leave the least entropy, with samples that have to be exact on both sides.
-fn plane(samples: &mut [Sample]) -> (usize, u8) {
+/// Axis and threshold that leave the least entropy, with samples on both sides, and not of the air alone where `is_surface`.
+fn plane(samples: &mut [Sample], is_surface: bool) -> (usize, u8) {
     let mut answers: Vec<Answer> = samples.iter().map(|sample| sample.answer).collect();
     answers.sort_unstable();
     answers.dedup();
@@ -195,27 +254,27 @@ fn plane(samples: &mut [Sample]) -> (usize, u8) {
     for axis in 0..4 {
         let size = 1 + samples.iter().map(|sample| usize::from(sample.at[axis])).max().unwrap_or(0);
         let mut counts = vec![0u32; size * answers.len()];
-        let mut entries = vec![0u32; size];
+        let mut sides = vec![0u32; size];
         for sample in samples.iter() {
             let place = usize::from(sample.at[axis]);
-            entries[place] += u32::from(sample.is_entry);
+            sides[place] += u32::from(sample.kind != Kind::Air || !is_surface);
             counts[place * answers.len() + sample.number as usize] +=
-                if sample.is_entry { ENTRY_WEIGHT } else { OTHER_WEIGHT };
+                if sample.kind == Kind::Air { AIR_WEIGHT } else { SURFACE_WEIGHT };
         }
         let (mut below, mut beyond) = (Tally::new(answers.len()), Tally::new(answers.len()));
         for of_place in counts.chunks(answers.len()) {
             of_place.iter().enumerate().for_each(|(i, &count)| beyond.change(i, count, u32::wrapping_add));
         }
-        let (mut entries_below, entries_all) = (0, entries.iter().sum::<u32>());
+        let (mut count_below, count_all) = (0, sides.iter().sum::<u32>());
         for (place, of_place) in counts.chunks(answers.len()).enumerate() {
-            if entries_below > 0 && entries_below < entries_all {
+            if count_below > 0 && count_below < count_all {
                 let left = below.entropy() + beyond.entropy();
                 // Sums of logarithms carry rounding: equal planes are to stay equal.
                 if left < best.0 - 1e-6 {
                     best = (left, axis, place as u8);
                 }
             }
-            entries_below += entries[place];
+            count_below += sides[place];
             for (i, &count) in of_place.iter().enumerate().filter(|(_, count)| **count > 0) {
                 below.change(i, count, u32::wrapping_add);
                 beyond.change(i, count, u32::wrapping_sub);

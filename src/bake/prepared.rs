@@ -77,6 +77,7 @@ impl Prepared<'_, '_> {
             world: self.world,
             settings: &self.capture,
             distance_clamp_m: clamp.map(|diagonals| diagonals * self.grid.spacing().length()),
+            voxels: self.config.store.occlusion.survey_voxels().map(|voxels| (&self.grid, voxels)),
             hit_light: self.config.transport.hit_light(),
             keeps_geometric: self.config.query.needs_geometric(),
             sees: self.config.store.light_field != LightFieldStore::None,

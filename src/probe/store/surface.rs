@@ -208,6 +208,13 @@ fn voxel_of(fraction: Vec3, n: u32) -> UVec3 {
     (fraction * n as f32).as_uvec3().min(UVec3::splat(n - 1))
 }
 
+/// Whether two points lie in the same voxel of the same cell, `n` voxels along each axis of a cell: where both face the same way
+/// they see the same probes.
+pub fn are_in_one_voxel(grid: &Grid, n: u32, points: [Vec3; 2]) -> bool {
+    let [a, b] = points.map(|point| grid.cell(point));
+    grid.cell_index(&a) == grid.cell_index(&b) && voxel_of(a.fraction, n) == voxel_of(b.fraction, n)
+}
+
 pub fn key(voxel: UVec3, facing: Facing, n: u32) -> u16 {
     ((voxel.x + n * (voxel.y + n * voxel.z)) * 6) as u16 + u16::from(facing.0)
 }

@@ -16,10 +16,13 @@ mkdir -p out/power
 
 python3 - "$lightprobe" out/power "${RUNS:-cornell:0.25 two_rooms_open:0.5 two_rooms_open:1 two_rooms_open:2 courtyard:2 office:2}" <<'PYTHON'
 import json
+import os
 import shutil
 import struct
 import subprocess
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 program, folder, runs = sys.argv[1], Path(sys.argv[2]), sys.argv[3].split()
@@ -62,7 +65,8 @@ def make(scene, spacing, percent, seed):
 
 
 def failing(a, b):
-    command = [program, "diff-report", a, b, "-o", folder / "diff", "--json", "--allow-scene-change"]
+    page = folder / f"diff_{threading.get_ident()}"
+    command = [program, "diff-report", a, b, "-o", page, "--json", "--allow-scene-change"]
     run = subprocess.run(command, capture_output=True, text=True)
     assert run.returncode < 2, run.stderr
     return [g["name"] for g in json.loads(run.stdout)["gates"] if not g["passed"] and not g["waived"]]
@@ -70,12 +74,18 @@ def failing(a, b):
 
 def several(sides, candidate):
     """A base of the eight seeds after the candidate's."""
-    base = folder / "several"
+    base = folder / f"several_{candidate}"
     shutil.rmtree(base, ignore_errors=True)
     base.mkdir()
     for step in range(1, SEEDS + 1):
         (base / str(step)).symlink_to(sides[(candidate + step) % len(sides)].resolve())
     return base
+
+
+def every(compare):
+    """What a comparison says of every pair."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(compare, range(PAIRS)))
 
 
 for run in runs:
@@ -87,10 +97,10 @@ for run in runs:
         "equal seeds": lambda i: sides[i],
     }
     for what, base in bases.items():
-        found = [failing(base(i), sides[i]) for i in range(PAIRS)]
+        found = every(lambda i: failing(base(i), sides[i]))
         print(f"{scene} {spacing} m, {what}: {sum(map(bool, found))} of {PAIRS} fail {[f for f in found if f]}", flush=True)
         for percent in PERCENTS:
-            caught = sum(bool(failing(base(i), make(scene, spacing, percent, i))) for i in range(PAIRS))
+            caught = sum(every(lambda i: bool(failing(base(i), make(scene, spacing, percent, i)))))
             print(f"  {what}: {percent} % brighter is caught in {caught} of {PAIRS}", flush=True)
             if caught >= NEEDED:
                 break

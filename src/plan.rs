@@ -4,6 +4,7 @@
 //! and stores all of it, and a test compares.
 
 use serde::Serialize;
+use serde_json::Value;
 
 use crate::config::{Config, VISIBILITY};
 use crate::light::World;
@@ -31,6 +32,14 @@ pub struct Plan {
     pub visibility: bool,
     /// Whether levels of radiance for glossy surfaces are stored.
     pub radiance_levels: bool,
+}
+
+/// The stage whose line is added last.
+const BOUNCES: &str = "bounces";
+
+/// The name of a line's stage for people: of bounces, those are left out that would come after the last.
+pub fn stage_in_words(stage: &str, kept: bool) -> &str {
+    if stage == BOUNCES && !kept { "further iterations" } else { stage }
 }
 
 impl Plan {
@@ -72,7 +81,7 @@ impl Plan {
             None => format!("all {done} iterations; the tolerance was not reached"),
         };
         let saved_s = (converged && saved > 0).then_some(per_bounce * f64::from(saved));
-        self.lines.push(Line { stage: "bounces", kept: !converged, reason, saved_bytes: None, saved_s });
+        self.lines.push(Line { stage: BOUNCES, kept: !converged, reason, saved_bytes: None, saved_s });
     }
 }
 
@@ -94,10 +103,20 @@ fn emission(world: &World) -> Line {
     }
 }
 
+/// What the line about a sky begins with that is a map.
+const MAP: &str = "an environment map";
+
+/// The environment map that a bake had, in words, by the plan that its file holds; `None` where it had none or does not
+/// say.
+pub fn environment_map(plan: &Value) -> Option<&str> {
+    let sky = plan["lines"].as_array()?.iter().find(|line| line["stage"] == "sky")?;
+    sky["reason"].as_str().filter(|reason| reason.starts_with(MAP))
+}
+
 fn sky(scene: &Scene) -> Line {
     match &scene.environment {
         environment if environment.is_black() => line("sky", false, "there is no sky"),
-        Environment::Map(map) => line("sky", true, format!("an environment map of {}×{}", map.width, map.height)),
+        Environment::Map(map) => line("sky", true, format!("{MAP} of {}×{}", map.width, map.height)),
         _ => line("sky", true, "a constant sky"),
     }
 }

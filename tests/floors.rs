@@ -127,3 +127,27 @@ fn no_files_import_each_other() {
     let circular: Vec<String> = imports.keys().filter(|m| reached_from(m).contains(*m)).map(|m| m.join("::")).collect();
     assert!(circular.is_empty(), "files that import each other in circles: {circular:#?}");
 }
+
+/// Causes are printed after what they caused. A message that holds its cause as well would say it twice.
+#[test]
+fn no_message_repeats_its_cause() {
+    struct Errors(Vec<String>);
+    impl<'ast> Visit<'ast> for Errors {
+        fn visit_variant(&mut self, variant: &'ast syn::Variant) {
+            let message = |a: &&syn::Attribute| a.path().is_ident("error");
+            let message = variant.attrs.iter().find(message).and_then(|a| a.parse_args::<syn::LitStr>().ok());
+            for (i, field) in variant.fields.iter().enumerate() {
+                let name = field.ident.as_ref().map_or_else(|| i.to_string(), ToString::to_string);
+                let is_cause = name == "source"
+                    || field.attrs.iter().any(|a| a.path().is_ident("from") || a.path().is_ident("source"));
+                if is_cause && message.as_ref().is_some_and(|m| m.value().contains(&format!("{{{name}"))) {
+                    self.0.push(variant.ident.to_string());
+                }
+            }
+        }
+    }
+    let (mut found, mut errors) = (BTreeMap::new(), Errors(Vec::new()));
+    files(Path::new("src"), &[], &mut found);
+    found.values().for_each(|file| errors.visit_file(file));
+    assert!(errors.0.is_empty(), "{:?}", errors.0);
+}

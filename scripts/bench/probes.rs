@@ -101,6 +101,7 @@ fn filter_and_bounce(criterion: &mut Criterion) {
         settings: &config.capture,
         distance_clamp_m: None,
         hit_light: config.transport.hit_light(),
+        voxels: None,
         keeps_geometric: false,
         sees: false,
         resampling: None,

@@ -47,8 +47,8 @@ impl Memory {
         let (distance_kernel, distances) = store.occlusion.filter_bytes(texels);
         let history = if config.transport.may_accelerate() { History::bytes(probes * unknowns as u64) } else { 0 };
         let radiance = store.radiance().working_bytes(config.capture.rays.side().unwrap_or(0));
-        // The last reflection, the one that is being traced, and their sum.
-        let traced = if config.transport.needs_light_field() { 3 * size_of::<glam::Vec3>() * texels } else { 0 } as u64;
+        // The last reflection, twice for checkpoints, the one that is being traced, and their sum.
+        let traced = if config.transport.needs_light_field() { 4 * size_of::<glam::Vec3>() * texels } else { 0 } as u64;
         let per_probe = store.irradiance.working_bytes(store.border)
             + store.occlusion.working_bytes(store.border)
             + radiance

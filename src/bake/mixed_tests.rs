@@ -8,9 +8,11 @@ use serde_json::json;
 use super::*;
 use crate::config::Config;
 use crate::light::World;
+use crate::probe::container::Container;
 use crate::probe::file::SceneRecord;
 use crate::probe::query::{Query, QueryPoint, Visibility};
 use crate::probe::store::surface::Facing;
+use crate::probe::transport::checkpoint;
 use crate::probe::{ProbeIndex, Volume};
 use crate::scene::{self, LoadOptions, Scene};
 
@@ -225,15 +227,15 @@ fn probes_in_order_reach_the_same_light() {
     assert!(published.solution.converged && last < 1e-3);
 }
 
+/// A checkpoint of few iterations, under the name of more of them, is what an interruption leaves.
 #[test]
-fn an_interrupted_pass_is_resumed() {
+fn an_interrupted_bake_is_resumed() {
     let scene = crossed_room();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("x.resume");
-    let words = ["transport=in_order(most: 3)"];
-    let config = |most: &str| {
-        let all = ["grid.divisions=(2,2,2)", "store.irradiance=sh9()", "capture.rays.octahedral.resolution=8"];
-        let words: Vec<String> = all.iter().chain(&words).chain(&[most]).map(|w| (*w).to_owned()).collect();
+    let config = |words: &[&str], most: &str| {
+        let all = ["grid.divisions=(2,2,2)", "capture.rays.octahedral.resolution=8"];
+        let words: Vec<String> = all.iter().chain(words).chain(&[most]).map(|w| (*w).to_owned()).collect();
         Config::default().with_overrides(&words).unwrap()
     };
     let run = |config: &Config, checkpoint: Option<Checkpoint>| {
@@ -242,13 +244,27 @@ fn an_interrupted_pass_is_resumed() {
         let record = SceneRecord { name: "crossed".into(), blake3: scene.blake3.clone() };
         prepare(&world, config, &circumstances).unwrap().bake(&circumstances, &record).unwrap()
     };
-    let config = config("transport.in_order.most=5");
     let checkpoint = |resume| Checkpoint { path: path.clone(), resume, interval: std::time::Duration::ZERO };
-    let whole = run(&config, None);
-    run(&config, Some(checkpoint(false)));
-    let resumed = run(&config, Some(checkpoint(true)));
-    assert_eq!(resumed.container, whole.container);
-    assert_eq!(resumed.solution, whole.solution);
+    let tracing = ["store.light_field=maps", "transport=tracing(tolerance: 0)"];
+    let in_order = ["store.irradiance=sh9()", "transport=in_order(tolerance: 0)"];
+    let frames = ["capture.emission=gathered", "transport=frames()"];
+    for (words, most) in [
+        (&tracing, "transport.tracing.iterations"),
+        (&in_order, "transport.in_order.most"),
+        (&frames, "transport.frames.most"),
+    ] {
+        let [few, many] = [2, 5].map(|n| config(words, &format!("{most}={n}")));
+        let whole = run(&many, None);
+        assert_eq!(whole.solution.bounces.len(), 5);
+        run(&few, Some(checkpoint(false)));
+        let mut left = Container::read(&path).unwrap();
+        let identity = checkpoint::identity(&scene.blake3, 1, &many.to_ron());
+        left.metadata.insert("identity".to_owned(), identity);
+        left.write(&path).unwrap();
+        let resumed = run(&many, Some(checkpoint(true)));
+        assert!(resumed.container == whole.container, "{most}: resumed, the file is another");
+        assert_eq!(resumed.solution, whole.solution, "{most}");
+    }
 }
 
 #[test]

@@ -181,7 +181,6 @@ impl<'a> Saver<'a> {
         if let Some(Checkpoint { path, interval, .. }) = self.checkpoint
             && self.last.elapsed() >= *interval
             && self.saved.is_ok()
-            && !progress.is_partial
         {
             self.saved = checkpoint::write(path, self.identity, progress, volume);
             self.last = Instant::now();

@@ -28,8 +28,9 @@ const PILOT_RAYS: usize = 1 << 21;
 pub struct Prediction {
     /// Done already.
     pub survey_s: f64,
+    /// Where iterations capture anew, all of them.
     pub capture_s: f64,
-    /// One bounce.
+    /// One bounce, where captures stand before.
     pub bounce_s: f64,
     /// As many as the mean albedo that the probes see asks for.
     pub bounces: u32,
@@ -118,12 +119,15 @@ impl Prepared<'_, '_> {
         // Where rows fit, all passes together take about as long as asking the surfaces once.
         let asked = if has_rows && rows::fit(&operator, &volume) { f64::from(bounces.max(1)) } else { 1.0 };
         let bounce_s = operator.time(&volume, &pilot) * share / asked;
-        // Frames are captured anew, and none is kept.
+        // Frames are captured anew, and none is kept; a bake counts all their time as capture.
         let once = config.transport.captures_once();
         Prediction {
             survey_s: self.survey_s,
-            capture_s: if once { capture_s * (pilot_captures + times) + pilot_bounces * bounce_s } else { 0.0 },
-            bounce_s: bounce_s * times + if once { retraced_s } else { capture_s },
+            capture_s: match once {
+                true => capture_s * (pilot_captures + times) + pilot_bounces * bounce_s,
+                false => f64::from(bounces) * (capture_s + bounce_s),
+            },
+            bounce_s: if once { bounce_s * times + retraced_s } else { 0.0 },
             bounces,
             capture_bytes: if once { (bytes as u64).min(budget) } else { 0 },
             map_bytes: self.memory.standing(),

@@ -8,7 +8,6 @@ use super::log::Log;
 use super::memory::Memory;
 use crate::config::{Config, VISIBILITY};
 use crate::light::World;
-use crate::light::contact::Contacts;
 use crate::math::random::Purpose;
 use crate::plan::Plan;
 use crate::probe::capture::{Capture, CaptureSettings, ProbeCapture, Resampling};
@@ -29,8 +28,6 @@ pub struct Prepared<'w, 's> {
     pub config: &'w Config,
     pub grid: Grid,
     pub placement: Placement,
-    /// The probes that lie in a surface.
-    contacts: Contacts,
     pub plan: Plan,
     pub survey_s: f64,
     pub(super) memory: Memory,
@@ -66,12 +63,11 @@ pub fn prepare<'w, 's>(
         log.stage(|times| &mut times.survey, "placing", 1, |bar| place(world, &task, || bar.set_prefix("surveying")));
     let plan = Plan::new(world, config, &grid, &placement);
     let hull = grid.hull(HULL_TOLERANCE);
-    let contacts = Contacts::of_points(world.scene, &placement.positions);
     let rays = config.capture.rays.without(config.placement.rule.reserved_rays());
     let capture = CaptureSettings { rays, ..config.capture.clone() };
     let resampling = log.time(|times| &mut times.filter, || capture.rays.resampling());
     let survey_s = log.times.survey;
-    Ok(Prepared { world, config, grid, placement, contacts, plan, survey_s, memory, capture, resampling, hull })
+    Ok(Prepared { world, config, grid, placement, plan, survey_s, memory, capture, resampling, hull })
 }
 
 impl Prepared<'_, '_> {
@@ -81,6 +77,7 @@ impl Prepared<'_, '_> {
             world: self.world,
             settings: &self.capture,
             distance_clamp_m: clamp.map(|diagonals| diagonals * self.grid.spacing().length()),
+            voxels: self.config.store.occlusion.survey_voxels().map(|voxels| (&self.grid, voxels)),
             hit_light: self.config.transport.hit_light(),
             keeps_geometric: self.config.query.needs_geometric(),
             sees: self.config.store.light_field != LightFieldStore::None,
@@ -145,7 +142,7 @@ impl Prepared<'_, '_> {
 
     /// Where a probe's rays start.
     fn viewpoint(&self, probe: usize) -> Vec3 {
-        self.contacts.viewpoint(probe, self.placement.positions[probe])
+        self.placement.contacts.viewpoint(probe, self.placement.positions[probe])
     }
 
     fn contains(&self, p: Vec3) -> bool {

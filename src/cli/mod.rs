@@ -83,10 +83,10 @@ pub struct TraceArgs {
     #[arg(long, value_name = "FILE.hdr|FILE.exr[:LAYER]|R,G,B", value_parser = EnvironmentSource::from_str, allow_hyphen_values = true)]
     pub env: Option<EnvironmentSource>,
     /// Turn the map of --env about +Y, counterclockwise as seen from above: 90 takes its centre from −Z to −X.
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, requires = "env", value_parser = parse_finite, allow_hyphen_values = true)]
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = parse_finite, allow_hyphen_values = true)]
     pub env_rotate: f64,
-    /// Multiply the radiance of --env, from 0 up.
-    #[arg(long, value_name = "X", default_value_t = 1.0, requires = "env", value_parser = parse_not_negative, allow_hyphen_values = true)]
+    /// Multiply the radiance of --env, from 0 up; a sky of the configuration is used as it is.
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = parse_not_negative, allow_hyphen_values = true)]
     pub env_scale: f32,
     /// Seed of all random numbers.
     #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]

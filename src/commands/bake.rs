@@ -11,13 +11,12 @@ use super::{Console, tell, write_json};
 use crate::bake::{Baked, Checkpoint, Circumstances, Prepared, prepare};
 use crate::cli::BakeArgs;
 use crate::config::Config;
-use crate::plan::Line;
+use crate::plan::{Line, stage_in_words};
 use crate::probe::fit::FitFigures;
 use crate::probe::lattice::ProbeState;
 use crate::probe::transport::checkpoint;
 use crate::report::bake::{BakeReport, BytesPerProbe, SCHEMA, SolverReport};
 use crate::report::table::{Column, Table};
-use crate::scene::light::LIGHT_MAX;
 use crate::scene::{Detail, Scene};
 use crate::system::format;
 use crate::system::memory::peak_memory_bytes;
@@ -72,6 +71,7 @@ fn opening<'a>(args: &'a BakeArgs, config: &Config) -> Result<Opening<'a>> {
         scene: args.scene.as_deref().context("no scene: give a .glb or .gltf file")?,
         trace: &args.trace,
         light: config.light(),
+        probes: None,
         detail: Detail::LIGHT,
         keep_images: config.plan.keeps_everything(),
         inputs: config_file.into_iter().collect(),
@@ -148,16 +148,22 @@ fn dry_run(prepared: &Prepared, circumstances: &Circumstances, console: &Console
         return console.print(&serde_json::to_string_pretty(&report)?);
     }
     console.print(&plan_table(&prepared.plan.lines))?;
+    let capture = format::seconds(p.capture_s);
+    let iterations = match prepared.config.transport.captures_once() {
+        true => {
+            let bounces = format::counted(u64::from(p.bounces), "bounce", "bounces");
+            format!("capture {capture}, {bounces} of {} each", format::seconds(p.bounce_s))
+        }
+        false => format!("capture {capture} in {}", format::counted(u64::from(p.bounces), "frame", "frames")),
+    };
     console.print(&format!(
         "{} probes, {active} of them to bake\n\
-         about {}: survey {}, capture {}, {} bounces of {} each\n\
+         about {}: survey {}, {}\n\
          about {} of memory: captures {}, maps and filters {}, scene and tables {}; before them, up to the survey, {}",
         prepared.grid.probe_count(),
         format::seconds(p.time_s()),
         format::seconds(p.survey_s),
-        format::seconds(p.capture_s),
-        p.bounces,
-        format::seconds(p.bounce_s),
+        iterations,
         format::bytes(p.memory_bytes()),
         format::bytes(p.capture_bytes),
         format::bytes(p.map_bytes),
@@ -216,21 +222,15 @@ fn warn_about(report: &BakeReport, config: &Config, console: &Console) {
             .warn("no probe is active: all lie inside geometry or where no surface can sample them; change the grid");
     }
     if numerics.hits_outside_volume > 0 {
-        console.warn(format!(
-            "{} captured hits lie outside the probes' hull and use the nearest cell; enlarge grid.bounds",
-            numerics.hits_outside_volume
-        ));
+        let hits = format::counted(numerics.hits_outside_volume, "captured hit lies", "captured hits lie");
+        console.warn(format!("{hits} outside the probes' hull, where the nearest cell is used; enlarge grid.bounds"));
     }
     if numerics.non_finite > 0 {
-        console.warn(format!("{} values were not finite and count as zero", numerics.non_finite));
+        let values =
+            format::counted(numerics.non_finite, "value was not finite and counts", "values were not finite and count");
+        console.warn(format!("{values} as zero"));
     }
-    if numerics.light_clamped > 0 {
-        console.warn(format!(
-            "{} lights or lit hits are brighter than {LIGHT_MAX:e} and clamped to that; lower the intensities, or set \
-             lights.punctual_scale",
-            numerics.light_clamped
-        ));
-    }
+    tell::too_bright(console, numerics.light_clamped, ["light or lit hit", "lights or lit hits"]);
     if numerics.albedo_clamped > 0 {
         console.say(format!(
             "{} material(s) reach an albedo above materials.albedo_max and are clamped to it",
@@ -281,18 +281,18 @@ fn summary(report: &BakeReport, config: &Config, output: &Path) -> String {
 
 /// How many there are, and by how many iterations where these are combined.
 fn bounces(report: &BakeReport, config: &Config) -> String {
-    let iterations = report.bounces.len();
+    let iterations = format::counted(report.bounces.len() as u64, "iteration", "iterations");
     if let Some(stopped) = report.solver.stopped {
-        return format!("all, by {iterations} iterations: {}", stopped.in_words());
+        return format!("all, by {iterations}: {}", stopped.in_words());
     }
     match report.solver.accelerated {
         _ if config.transport.is_complete() => "all, by paths".to_owned(),
         0 => report.bounces.last().map_or(0, |bounce| bounce.index).to_string(),
-        _ => format!("all, by {iterations} iterations"),
+        _ => format!("all, by {iterations}"),
     }
 }
 
 fn plan_summary(lines: &[Line]) -> String {
-    let left_out: Vec<&str> = lines.iter().filter(|l| !l.kept).map(|l| l.stage).collect();
+    let left_out: Vec<&str> = lines.iter().filter(|l| !l.kept).map(|l| stage_in_words(l.stage, l.kept)).collect();
     if left_out.is_empty() { "left out: nothing".to_owned() } else { format!("left out: {}", left_out.join(", ")) }
 }

@@ -3,7 +3,7 @@
 use anyhow::{Context, Result, anyhow};
 use serde_json::json;
 
-use super::session::{Opening, Session, inputs};
+use super::session::{Opening, Probes, Session, inputs};
 use super::{Console, tell};
 use crate::bake::convert::to_uniform;
 use crate::cli::ConvertArgs;
@@ -26,13 +26,13 @@ pub fn run(args: &ConvertArgs, console: &Console) -> Result<()> {
         scene: &args.scene,
         trace: &args.trace,
         light: probes.query.light,
+        probes: Some(Probes { path: &args.probes, file: &probes, allow_change: args.allow_scene_change }),
         detail: Detail::LIGHT,
         keep_images: false,
         inputs: vec![Named::new("the probe file", &args.probes)],
         outputs: vec![output],
     };
     let session = Session::open(opening, console)?;
-    super::check_scene(&args.probes, &probes, &args.scene, &session.scene, args.allow_scene_change, console)?;
     let (world, _) = session.world()?;
     let mixed = probes.volume(session.scene.origin_world);
     let converted = to_uniform(&world, &mixed).map_err(|what| anyhow!("{place}: {what}"))?;

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 
 use super::{Console, tell};
 use crate::cli::InspectArgs;
+use crate::plan::stage_in_words;
 use crate::probe::file::published::threev8_bytes;
 use crate::probe::file::{self, FORMAT, ProbeFile};
 use crate::probe::lattice::ProbeState;
@@ -16,6 +17,9 @@ use crate::probe::store::tiles::TileStore;
 use crate::probe::{ProbeIndex, Volume};
 use crate::report::table::{Column, Table};
 use crate::system::format;
+
+/// Significant digits of irradiance; the finest format, f32, holds about seven.
+const DIGITS: usize = 6;
 
 pub fn run(args: &InspectArgs, console: &Console) -> Result<()> {
     let started = Instant::now();
@@ -153,15 +157,17 @@ fn to_text(file: &ProbeFile, probe: Option<u32>) -> String {
         let state = serde_json::to_value(volume.states[p as usize]).unwrap_or_default();
         out += &format!("probe {p} at {:?} m, {}\n", position_world(volume, index), state.as_str().unwrap_or_default());
         for (name, e) in axes(volume, index) {
-            out += &format!("  irradiance {name}  {:.6} {:.6} {:.6}\n", e.x, e.y, e.z);
+            let channels = e.to_array().map(|channel| format::significant(f64::from(channel), DIGITS)).join(" ");
+            out += &format!("  irradiance {name}  {channels}\n");
         }
     }
     if let Some(lines) = file.plan["lines"].as_array() {
         out += "plan\n";
         for line in lines {
-            let kept = if line["kept"].as_bool().unwrap_or(true) { "kept" } else { "left out" };
+            let is_kept = line["kept"].as_bool().unwrap_or(true);
+            let kept = if is_kept { "kept" } else { "left out" };
             let text = |key: &str| line[key].as_str().unwrap_or_default().to_owned();
-            out += &format!("  {:<22} {kept:<9} {}\n", text("stage"), text("reason"));
+            out += &format!("  {:<22} {kept:<9} {}\n", stage_in_words(&text("stage"), is_kept), text("reason"));
         }
     }
     out + "configuration\n" + &file.config

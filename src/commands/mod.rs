@@ -14,11 +14,9 @@ mod tell;
 use std::io::Write;
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 
 use crate::cli::{Cli, Command, OutputFlags, PictureSize};
-use crate::probe::file::ProbeFile;
-use crate::scene::Scene;
 use crate::system::memory::{TooLittleMemory, check_available};
 use crate::system::output::write_atomically;
 use crate::system::progress::Progress;
@@ -93,32 +91,6 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Inspect(args) => inspect::run(&args, &console)?,
     }
     Ok(Outcome::Done)
-}
-
-/// Whether the scene is another than the probes were baked from; an error unless allowed.
-fn check_scene(
-    probes_path: &Path,
-    probes: &ProbeFile,
-    scene_path: &Path,
-    scene: &Scene,
-    allow_change: bool,
-    console: &Console,
-) -> Result<bool> {
-    if probes.scene.blake3 == scene.blake3 {
-        return Ok(false);
-    }
-    let what = format!(
-        "{} was baked from another scene than {} now is (its files or its sky have changed)",
-        probes_path.display(),
-        scene_path.display()
-    );
-    if !allow_change {
-        bail!(
-            "{what}; bake it again, give the --env, --env-rotate and --env-scale of the bake, or pass --allow-scene-change"
-        );
-    }
-    console.warn(what);
-    Ok(true)
 }
 
 /// Refuses pictures of this size where they take more memory than there is.

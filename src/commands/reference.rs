@@ -76,10 +76,10 @@ pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
         tell::written(console, &args.output);
     }
     times.total = session.elapsed_s();
-    if reference.non_finite > 0 {
-        console.warn(format!("{} samples were not finite and count as 0", reference.non_finite));
-    }
-    let report = report(&session, &config, args, (&camera, &settings, resumed), &reference, times);
+    tell::not_finite(console, reference.non_finite);
+    tell::too_bright(console, tracing.clamped(), ["point of the picture", "points of the picture"]);
+    let mut report = report(&session, &config, args, (&camera, &settings, resumed), &reference, times);
+    report.light_clamped += tracing.clamped();
     if let Some(path) = &args.report {
         write_json(path, &report)?;
         tell::written(console, path);
@@ -95,6 +95,7 @@ fn opening<'a>(args: &'a ReferenceArgs, config: &Config) -> Opening<'a> {
         scene: &args.scene,
         trace: &args.trace,
         light: config.light(),
+        probes: None,
         detail: match args.transport {
             TransportName::Lambert => Detail::PICTURE,
             TransportName::Gltf => Detail::GLOSSY,
@@ -149,8 +150,10 @@ fn report(
         rays: Rays { primary: rays.primary, shadow: rays.shadow },
         time_s,
         rays_per_s: (traced > 0.0 && time_s.trace > 0.0).then(|| traced / time_s.trace),
+        irradiance_indirect_mean: reference.irradiance_indirect_mean(),
         noise: reference.noise.map(noise_report),
         non_finite: reference.non_finite,
+        light_clamped: session.scene.light_clamped,
         peak_memory_bytes: peak_memory_bytes(),
     }
 }
@@ -222,12 +225,18 @@ fn noise_report(noise: NoiseLevel) -> NoiseReport {
 fn summary(report: &ReferenceReport) -> Table {
     let mut table = Table::new(&[("reference", Column::Text), ("", Column::Number)]);
     let millions = |n: u64| format!("{} M", format::significant(n as f64 / 1e6, 3));
-    let noise = report.noise.as_ref();
+    let standard_error = match &report.noise {
+        Some(noise) => format::or_undefined(noise.relative, format::percent),
+        None => format!("not known below {} samples", 2 * BLOCK),
+    };
     for (name, value) in [
         ("camera", format!("{}, {}×{}", report.camera, report.width, report.height)),
         ("samples per pixel", report.spp.to_string()),
-        ("irradiance, whole picture", format::or_undefined(noise, |n| format::significant(n.mean, 4))),
-        ("standard error", format::or_undefined(noise.and_then(|n| n.relative), format::percent)),
+        (
+            "irradiance, whole picture",
+            format::or_undefined(report.irradiance_indirect_mean, |e| format::significant(e, 4)),
+        ),
+        ("standard error", standard_error),
         ("rays", millions(report.rays.primary + report.rays.shadow)),
         ("ray rate", format::or_undefined(report.rays_per_s, |r| format!("{} M/s", format::significant(r / 1e6, 3)))),
         ("tracing", format::seconds(report.time_s.trace)),

@@ -3,15 +3,17 @@
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Result, bail, ensure};
 use serde::Serialize;
 
 use super::{Console, tell};
 use crate::cli::{ConfigArgs, TraceArgs};
 use crate::config::{Config, Layers, presets};
 use crate::light::World;
-use crate::probe::file::{LightRecord, SceneRecord};
+use crate::plan;
+use crate::probe::file::{LightRecord, ProbeFile, SceneRecord};
 use crate::report::header::{Header, command_line};
+use crate::scene::light::LIGHT_MAX;
 use crate::scene::{self, Detail, EnvironmentSource, LoadOptions, Scene};
 use crate::system::output::{Named, check_apart, check_outputs};
 
@@ -21,6 +23,8 @@ pub struct Opening<'a> {
     pub trace: &'a TraceArgs,
     /// The light that the configuration, or the probe file, gives the scene.
     pub light: LightRecord,
+    /// The probes that the scene is to be the one of; `None` where the command reads none.
+    pub probes: Option<Probes<'a>>,
     /// What the command looks at of materials.
     pub detail: Detail,
     /// Whether images whose texels are all equal are kept whole.
@@ -31,11 +35,22 @@ pub struct Opening<'a> {
     pub outputs: Vec<Named>,
 }
 
+/// A probe file that a command reads beside the scene.
+#[derive(Clone, Copy)]
+pub struct Probes<'a> {
+    pub path: &'a Path,
+    pub file: &'a ProbeFile,
+    /// Whether the scene may be another than that of the bake.
+    pub allow_change: bool,
+}
+
 /// A loaded scene and the circumstances of the command that works on it.
 pub struct Session<'c> {
     pub console: &'c Console,
     pub scene: Scene,
     pub light: LightRecord,
+    /// Whether the scene is another than the probes were baked from.
+    pub scene_changed: bool,
     pub seed: u64,
     pub threads: usize,
     pub started: Instant,
@@ -46,9 +61,10 @@ impl<'c> Session<'c> {
     /// Checks, binds threads and loads. Nothing is traced, nothing written.
     ///
     /// # Errors
-    /// An output cannot be written, or is an input; the scene cannot be loaded.
+    /// An output cannot be written, or is an input; the scene cannot be loaded, or is another than that of the probes.
     pub fn open(opening: Opening, console: &'c Console) -> Result<Session<'c>> {
         let Opening { scene: path, trace, light, .. } = opening;
+        check_sky_flags(trace, light.sky)?;
         check_outputs(&opening.outputs, &inputs(path, trace, opening.inputs))?;
         let threads = set_threads(trace.threads)?;
         let started = Instant::now();
@@ -64,14 +80,23 @@ impl<'c> Session<'c> {
             ..Default::default()
         };
         let scene = scene::load(path, &options)?;
+        // Before warnings: what the scene lacks may be the sky of the bake.
+        let lost_sky = opening.probes.and_then(|probes| lost_sky(trace, probes.file));
+        let scene_changed = match opening.probes {
+            Some(probes) => check_scene(probes, path, &scene, lost_sky, console)?,
+            None => false,
+        };
         for warning in &scene.warnings {
             console.warn(format!("{}: {warning}", path.display()));
+        }
+        if lost_sky.is_none() {
+            tell::darkness(console, path, &scene);
         }
         let load_s = started.elapsed().as_secs_f64();
         if !opening.detail.gloss {
             tell::metal(console, path, &scene);
         }
-        let session = Session { console, scene, light, seed: trace.seed, threads, started, load_s };
+        let session = Session { console, scene, light, scene_changed, seed: trace.seed, threads, started, load_s };
         session.check_apart(&opening.outputs)?;
         tell::scene(console, path, &session.scene, load_s);
         Ok(session)
@@ -125,7 +150,7 @@ impl<'c> Session<'c> {
 fn set_threads(threads: usize) -> Result<usize> {
     /// More than any machine has; guards against typing errors that would exhaust memory.
     const MOST: usize = 1024;
-    anyhow::ensure!(threads <= MOST, "--threads {threads}: at most {MOST} make sense; use 0 for one per core");
+    ensure!(threads <= MOST, "--threads {threads}: at most {MOST} make sense; use 0 for one per core");
     // Fails only when a pool stands already, as when commands run twice in one process.
     let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     Ok(rayon::current_num_threads())
@@ -162,8 +187,67 @@ pub fn resolve_config(args: &ConfigArgs, trace: &TraceArgs) -> Result<Config> {
         layers = layers.file(path)?;
     }
     let mut config = layers.set(&args.set)?.config()?;
+    check_sky_flags(trace, config.lights.sky)?;
     set_sky(&mut config, trace);
     Ok(config)
+}
+
+/// `--env-rotate` and `--env-scale` change the sky of `--env`. Others are used as they are: a probe file's is scaled
+/// already.
+fn check_sky_flags(trace: &TraceArgs, sky: Option<(f32, f32, f32)>) -> Result<()> {
+    let flag = match trace {
+        TraceArgs { env: Some(EnvironmentSource::Constant(sky)), env_scale, .. } => {
+            let is_bounded = (*sky * *env_scale).max_element() <= LIGHT_MAX;
+            ensure!(
+                is_bounded,
+                "--env-scale {env_scale:?}: the sky is brighter than {LIGHT_MAX:e} then; give a smaller one"
+            );
+            return Ok(());
+        }
+        TraceArgs { env: Some(_), .. } => return Ok(()),
+        TraceArgs { env_rotate, .. } if *env_rotate != 0.0 => "--env-rotate",
+        TraceArgs { env_scale, .. } if *env_scale != 1.0 => "--env-scale",
+        _ => return Ok(()),
+    };
+    match sky {
+        None => bail!("{flag} changes the sky that --env gives, and there is no --env; give one, or leave {flag} out"),
+        Some((r, g, b)) => bail!(
+            "{flag} changes the sky that --env gives, and the sky is lights.sky of the configuration or the probe file, \
+             which is used as it is; give it as --env {r:?},{g:?},{b:?} too, or leave {flag} out"
+        ),
+    }
+}
+
+/// The environment map that the probes were baked under, in words, where no sky is given now.
+fn lost_sky<'p>(trace: &TraceArgs, probes: &'p ProbeFile) -> Option<&'p str> {
+    plan::environment_map(&probes.plan).filter(|_| trace.env.is_none() && probes.query.light.sky.is_none())
+}
+
+/// Whether the scene is another than the probes were baked from; an error unless allowed.
+fn check_scene(
+    probes: Probes,
+    scene_path: &Path,
+    scene: &Scene,
+    lost_sky: Option<&str>,
+    console: &Console,
+) -> Result<bool> {
+    let Probes { path, file, allow_change } = probes;
+    if file.scene.blake3 == scene.blake3 {
+        return Ok(false);
+    }
+    let (path, scene_path) = (path.display(), scene_path.display());
+    let what = match lost_sky {
+        Some(map) => format!("{path} was baked under {map}, and there is no --env"),
+        None => {
+            format!("{path} was baked from another scene than {scene_path} now is (its files or its sky have changed)")
+        }
+    };
+    if allow_change {
+        console.warn(what);
+        return Ok(true);
+    }
+    let bake_again = if lost_sky.is_some() { "" } else { "bake it again, " };
+    bail!("{what}; {bake_again}give the --env, --env-rotate and --env-scale of the bake, or pass --allow-scene-change")
 }
 
 /// A constant `--env` in place of the configured sky.

@@ -6,11 +6,12 @@ use super::Console;
 use crate::bake::{Baked, Prepared};
 use crate::cli::{ConfigArgs, PictureSize};
 use crate::light::sampled::RayCount;
-use crate::plan::Line;
+use crate::plan::{Line, stage_in_words};
 use crate::probe::file::ProbeFile;
 use crate::probe::lattice::ProbeState;
 use crate::report::render::RenderReport;
 use crate::scene::Scene;
+use crate::scene::light::LIGHT_MAX;
 use crate::system::format;
 
 /// Where the configuration in effect comes from.
@@ -23,15 +24,42 @@ pub fn configuration(console: &Console, args: &ConfigArgs) {
 }
 
 pub fn scene(console: &Console, path: &Path, scene: &Scene, load_s: f64) {
+    let counted = |number: usize, one, many| format::counted(number as u64, one, many);
     console.say(format!(
-        "scene: {}, {} triangles, {} punctual lights, {} cameras, {} files, loaded in {}",
+        "scene: {}, {}, {}, {}, {}, loaded in {}",
         path.display(),
-        scene.mesh.triangles.len(),
-        scene.lights.len(),
-        scene.cameras.len(),
-        scene.files.len(),
+        counted(scene.mesh.triangles.len(), "triangle", "triangles"),
+        counted(scene.lights.len(), "punctual light", "punctual lights"),
+        counted(scene.cameras.len(), "camera", "cameras"),
+        counted(scene.files.len(), "file", "files"),
         format::seconds(load_s),
     ));
+}
+
+/// Warns of light that was clamped; `what` is one such thing and several.
+pub fn too_bright(console: &Console, number: u64, what: [&str; 2]) {
+    if number > 0 {
+        console.warn(format!(
+            "{} brighter than {LIGHT_MAX:e} and clamped to that; lower the intensities, or set lights.punctual_scale",
+            format::counted(number, &format!("{} is", what[0]), &format!("{} are", what[1]))
+        ));
+    }
+}
+
+/// Warns of samples of a reference that are no numbers.
+pub fn not_finite(console: &Console, number: u64) {
+    if number > 0 {
+        let samples = format::counted(number, "sample of the reference was", "samples of the reference were");
+        console.warn(format!("{samples} not finite: counted as 0"));
+    }
+}
+
+/// Warns of a scene without any light.
+pub fn darkness(console: &Console, path: &Path, scene: &Scene) {
+    if scene.is_dark() {
+        console
+            .warn(format!("{}: nothing in the scene sends out light; give it a sky with --env 1,1,1", path.display()));
+    }
 }
 
 /// Warns of metal, which is black where all surfaces are Lambertian.
@@ -74,7 +102,7 @@ pub fn prepared(console: &Console, prepared: &Prepared) {
 
 pub fn plan_line(console: &Console, line: &Line) {
     let kept = if line.kept { "kept" } else { "left out" };
-    console.say(format!("plan: {} {kept}: {}", line.stage, line.reason));
+    console.say(format!("plan: {} {kept}: {}", stage_in_words(line.stage, line.kept), line.reason));
 }
 
 pub fn baked(console: &Console, baked: &Baked) {
@@ -86,8 +114,8 @@ pub fn baked(console: &Console, baked: &Baked) {
         format::seconds(times.capture)
     ));
     console.say(format!(
-        "bounces: {} iterations in {}, {}",
-        baked.solution.bounces.len(),
+        "bounces: {} in {}, {}",
+        format::counted(baked.solution.bounces.len() as u64, "iteration", "iterations"),
         format::seconds(times.bounces),
         if baked.solution.converged { "converged" } else { "not converged" }
     ));

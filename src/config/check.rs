@@ -67,7 +67,8 @@ impl Config {
         let mut first_error = Ok(());
         let mut rule = |key: &'static str, value: String, holds: bool, rule: &'static str| {
             if !holds && first_error.is_ok() {
-                first_error = Err(ConfigError::OutOfRange { place: place.to_owned(), key, value, rule });
+                let (place, value) = (place.to_owned(), shown(value));
+                first_error = Err(ConfigError::OutOfRange { place, key, value, rule });
             }
         };
         let g = &self.grid;
@@ -120,5 +121,14 @@ impl Config {
             );
         }
         first_error
+    }
+}
+
+/// A value for a message: numbers of more than a line's part of digits with an exponent.
+fn shown(value: String) -> String {
+    const MOST_CHARACTERS: usize = 20;
+    match value.parse::<f64>() {
+        Ok(number) if value.len() > MOST_CHARACTERS => format!("{number:e}"),
+        _ => value,
     }
 }

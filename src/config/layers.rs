@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::assignments::{self, Assignment, below, choice};
 use super::ron_text::{ConfigError, ron_options};
 use super::settings::Config;
-use super::{aliases, messages, presets};
+use super::{aliases, choices, messages, presets};
 use crate::system::input::read_file;
 
 /// Assignments in the order in which they count: a later one replaces an earlier one.
@@ -128,7 +128,7 @@ impl Tree {
     }
 
     fn at(&self, path: &str) -> Option<&Value> {
-        at(&self.tree, path)
+        choices::at(&self.tree, path)
     }
 
     /// Takes an assignment apart until it names a single key, and sets it.
@@ -182,34 +182,25 @@ impl Tree {
             return self.set(assignment);
         }
         let mut scratch = Tree::new(&self.config);
-        if let Some((parent, choice)) = self.missing_choice(&assignment.path) {
+        if let Some((parent, choice, _)) = choices::missing(&self.tree, &assignment.path) {
             let taken = Assignment { path: parent, value: format!("{choice}()"), ..assignment.clone() };
             scratch.set(&taken)?;
         }
         scratch.set(assignment)
     }
 
-    /// Where a path leaves the tree: the key that holds another choice, and the choice that the path asks for.
-    fn missing_choice(&self, path: &str) -> Option<(String, String)> {
-        let keys: Vec<&str> = path.split('.').collect();
-        let at = (1..keys.len()).find(|&i| self.at(&keys[..=i].join(".")).is_none())?;
-        Some((keys[..at].join("."), keys[at].to_owned()))
-    }
-
     fn set(&mut self, Assignment { place, path, value }: &Assignment) -> Result<(), ConfigError> {
         let error = |what: String| ConfigError::Invalid { place: place.clone(), what };
-        let mut alone = alone(path, value);
+        let mut alone = choices::alone(path, value);
         // `bounces` means `bounces()`, and `grid_points()` means `grid_points`.
         if let (Err(_), Some((name, "" | "()"))) = (&alone, choice(value)) {
             let other = if value.ends_with(')') { name.to_owned() } else { format!("{name}()") };
-            alone = self::alone(path, &other).or(alone);
+            alone = choices::alone(path, &other).or(alone);
         }
         if self.at(path).is_none()
-            && alone.is_ok()
-            && let Some((parent, choice)) = self.missing_choice(path)
+            && let Some(what) = choices::not_taken(&self.tree, path)
         {
-            let taken = self.at(&parent).map(name_of).unwrap_or_default();
-            return Err(error(format!("{parent} is {taken}, so '{path}' has no effect; write {parent}={choice}(...)")));
+            return Err(error(what));
         }
         if self.at(path).is_none()
             && let Some(values) = aliases::values(path)
@@ -221,7 +212,7 @@ impl Tree {
             alone.check(place)?;
         }
         let parsed = match &alone {
-            Ok(alone) => serde_json::to_value(alone).ok().and_then(|alone| at(&alone, path).cloned()),
+            Ok(alone) => choices::value_at(alone, path),
             // One key of several that are only there together: the others stand already.
             Err(error) if matches!(error.code, ron::Error::MissingStructField { .. }) => {
                 ron_options().from_str(value).ok().filter(Value::is_array)
@@ -246,12 +237,6 @@ fn keys_of(config: &Config) -> Value {
         sections.entry("fit").or_insert_with(|| "none".into());
     }
     tree
-}
-
-/// The name of a choice, with its settings or without.
-fn name_of(choice: &Value) -> String {
-    let with_settings = choice.as_object().and_then(|map| map.keys().next());
-    with_settings.map(String::as_str).or(choice.as_str()).unwrap_or("something else").to_owned()
 }
 
 /// What is wrong with a value: RON knows it better where it is about names.
@@ -287,49 +272,6 @@ fn set(tree: &mut Value, path: &str, value: Value) -> Result<(), String> {
     }
     *node = value;
     Ok(())
-}
-
-fn at<'v>(tree: &'v Value, path: &str) -> Option<&'v Value> {
-    path.split('.').try_fold(tree, |node, key| node.get(key))
-}
-
-/// A configuration with nothing but this key. A key may be a field, or a choice and then stand before its settings.
-fn alone(path: &str, value: &str) -> Result<Config, SpannedError> {
-    let keys: Vec<&str> = path.split('.').collect();
-    let text = |choices: usize| {
-        keys.iter().enumerate().rev().fold(value.to_owned(), |inner, (i, key)| match choices >> i & 1 {
-            1 => format!("{key}{inner}"),
-            _ => format!("({key}: {inner})"),
-        })
-    };
-    let parse = |choices: usize| ron_options().from_str::<Config>(&text(choices));
-    let mut best: Option<SpannedError> = None;
-    // Choices stand before settings in parentheses: those of a field, or the value's own.
-    let last = keys.len().min(8);
-    let fits = |choices: usize| {
-        let followed = |i: usize| if i + 1 < last { choices >> (i + 1) & 1 == 0 } else { value.starts_with('(') };
-        (0..last).all(|i| choices >> i & 1 == 0 || i > 0 && followed(i))
-    };
-    for choices in (0..1usize << last).filter(|&choices| fits(choices)) {
-        match parse(choices) {
-            Ok(config) => return Ok(config),
-            // Who gets as far as the value knows best what is wrong with it.
-            Err(error) => {
-                let is_about_value = matches!(
-                    &error.code,
-                    ron::Error::NoSuchEnumVariant { found, .. } | ron::Error::NoSuchStructField { found, .. }
-                        if !keys.contains(&found.as_str())
-                );
-                if best.is_none() || is_about_value {
-                    best = Some(error);
-                }
-            }
-        }
-    }
-    match best {
-        Some(error) => Err(error),
-        None => parse(0),
-    }
 }
 
 /// A number, `true`, JSON, or else the name of a choice.

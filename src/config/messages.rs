@@ -6,6 +6,8 @@ use ron::error::SpannedError;
 const FORMS: &[(&str, &str)] = &[
     ("cosine", "cosine(floor: 0.05)"),
     ("wrap", "wrap(offset: 0.2)"),
+    ("eccentric", "eccentric(kappa: 0.9)"),
+    ("bilateral", "bilateral(radius: 3, normal_power: 32, distance: 0.1)"),
     ("path_traced", "path_traced(paths: 16)"),
     ("paths", "paths(paths: 16)"),
     ("chebyshev", "chebyshev(power: 3, floor: 0.05)"),
@@ -31,10 +33,7 @@ pub fn of_file(error: &SpannedError, text: &str) -> String {
 pub fn of_value(error: &ron::Error, value: &str) -> String {
     match error {
         ron::Error::NoSuchStructField { expected, found, .. } => unknown_key(found, expected.iter().copied()),
-        ron::Error::NoSuchEnumVariant { expected, found, .. } => {
-            let choices = expected.join(", ");
-            format!("there is no choice '{found}'{}; the choices are {choices}", suggestion(found, expected.iter()))
-        }
+        ron::Error::NoSuchEnumVariant { expected, found, .. } => unknown_choice(found, expected),
         ron::Error::ExpectedNamedStructLike("Config") => {
             "the keys stand in parentheses, as in (grid: (spacing_m: 0.5)); () gives the defaults".to_owned()
         }
@@ -66,6 +65,11 @@ pub fn in_plain_words(message: &str) -> String {
     };
     let found = found.split_once(' ').map_or(found, |(_, value)| value);
     format!("{found} does not fit: write {expected}")
+}
+
+/// Message for a choice that does not exist.
+pub fn unknown_choice(found: &str, known: &[&str]) -> String {
+    format!("there is no choice '{found}'{}; the choices are {}", suggestion(found, known.iter()), known.join(", "))
 }
 
 /// Message for a key that does not exist.

@@ -7,6 +7,7 @@
 mod aliases;
 mod assignments;
 mod check;
+mod choices;
 mod layers;
 pub(crate) mod messages;
 pub mod presets;

@@ -56,6 +56,12 @@ pub fn bounded(light: Vec3) -> Vec3 {
     light.min(Vec3::splat(LIGHT_MAX))
 }
 
+/// Whether light has reached [`LIGHT_MAX`] in a channel, and so may have been clamped to it.
+#[inline]
+pub fn at_bound(light: Vec3) -> bool {
+    light.max_element() >= LIGHT_MAX
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -45,17 +45,16 @@ pub struct World<'s> {
 
 impl<'s> World<'s> {
     pub fn new(scene: &'s Scene, punctual_scale: f32, albedo_max: f32) -> Result<World<'s>, TraceError> {
-        let tracer = Tracer::build(scene)?;
-        Ok(World {
-            scene,
-            tracer,
-            emitters: Emitters::new(scene, punctual_scale),
-            surfaces: SurfaceTable::new(scene),
-            places: Places::new(scene),
-            light_contacts: Contacts::of_lights(scene),
-            punctual_scale,
-            albedo_max,
-        })
+        // Embree builds on one thread; the others make the tables meanwhile.
+        let tables = || {
+            let ((emitters, surfaces), (places, light_contacts)) = rayon::join(
+                || (Emitters::new(scene, punctual_scale), SurfaceTable::new(scene)),
+                || (Places::new(scene), Contacts::of_lights(scene)),
+            );
+            (emitters, surfaces, places, light_contacts)
+        };
+        let (tracer, (emitters, surfaces, places, light_contacts)) = rayon::join(|| Tracer::build(scene), tables);
+        Ok(World { scene, tracer: tracer?, emitters, surfaces, places, light_contacts, punctual_scale, albedo_max })
     }
 
     /// Number of materials whose factors allow an albedo above [`World::albedo_max`].

@@ -179,7 +179,8 @@ impl World<'_> {
         }
         match self.surfaces.constants[record.material as usize].emission {
             Some(emission) => emission,
-            None => self.scene.emission(hit.triangle, hit.barycentric),
+            // Where something lies in front, rays have passed already or do not come here.
+            None => self.scene.uncovered_emission(hit.triangle, hit.barycentric),
         }
     }
 

@@ -28,10 +28,15 @@ pub struct ReferenceReport {
     pub time_s: ReferenceTimes,
     /// Rays of this run ÷ `time_s.trace`. `null` if this run added no samples.
     pub rays_per_s: Option<f64>,
+    /// Mean of `irradiance_indirect` over pixels and channels, W·m⁻².
+    pub irradiance_indirect_mean: Option<f64>,
     /// Noise of `irradiance_indirect`, W·m⁻². `null` below two blocks of 16 samples.
     pub noise: Option<NoiseReport>,
     /// Number of samples that were not finite. They count as 0.
     pub non_finite: u64,
+    /// Lights, emissive materials and sky texels of the scene, and points of the picture lit by punctual lights, whose light
+    /// exceeds the largest that is computed with, 10³⁰ per channel, and is clamped to it.
+    pub light_clamped: u64,
     pub peak_memory_bytes: u64,
 }
 

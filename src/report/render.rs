@@ -25,6 +25,8 @@ pub struct RenderReport {
     pub height: u32,
     /// Image points that show a surface.
     pub points: usize,
+    /// As `light_clamped` of a reference.
+    pub light_clamped: u64,
     /// Of all of the run's PNG pictures: they show radiance × 2^this.
     pub exposure_ev: f32,
     pub probes: usize,

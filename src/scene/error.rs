@@ -24,7 +24,7 @@ pub enum SceneError {
     Invalid { file: PathBuf, place: String, what: String, remedy: &'static str },
     /// An environment map cannot be decoded.
     #[error("environment map: {0}")]
-    EnvironmentMap(#[from] ImageError),
+    EnvironmentMap(ImageError),
     /// A texture image cannot be decoded, or the sky has no finite radiance.
     #[error("{file}: {place}: {what}; {remedy}")]
     Image { file: PathBuf, place: String, what: String, remedy: &'static str },

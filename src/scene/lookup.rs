@@ -55,12 +55,13 @@ impl Scene {
         ((material.roughness * texel.y).clamp(0.0, 1.0), (material.metallic * texel.z).clamp(0.0, 1.0))
     }
 
-    /// Radiance that an emitting side of the surface emits, W·m⁻²·sr⁻¹. It is 0 where another emitter lies in front in
-    /// the same plane, so that light is not counted twice.
-    pub fn emission(&self, triangle: TriangleIndex, barycentric: Vec2) -> Vec3 {
+    /// Radiance that the front (`front`) or back of the surface emits, if that side emits, W·m⁻²·sr⁻¹. It is 0 where another
+    /// emitter lies in front of that side in the same plane, so that light is not counted twice.
+    pub fn emission(&self, triangle: TriangleIndex, barycentric: Vec2, front: bool) -> Vec3 {
         let emission = self.uncovered_emission(triangle, barycentric);
         if !self.mesh.covers.of(triangle).is_empty() {
-            let into = -self.mesh.geometric_normal(triangle);
+            let normal = self.mesh.geometric_normal(triangle);
+            let into = if front { -normal } else { normal };
             let mut shown = 1.0;
             self.covers_at(triangle, barycentric, into).for_each(|(by, place)| shown *= 1.0 - self.opacity(by, place));
             return emission * shown;

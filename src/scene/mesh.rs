@@ -3,6 +3,7 @@
 use std::ops::{Add, Mul};
 
 use glam::{Vec2, Vec3, Vec4};
+use rayon::prelude::*;
 
 use super::{Covers, MaterialIndex};
 
@@ -68,8 +69,12 @@ impl Mesh {
 
     /// Smallest box around all vertices that triangles use. `None` without triangles.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
-        let mut vertices = self.triangles.iter().flatten().map(|&v| self.positions[v as usize]);
-        let first = vertices.next()?;
-        Some(vertices.fold((first, first), |(low, high), p| (low.min(p), high.max(p))))
+        let first = self.positions[*self.triangles.first()?.first()? as usize];
+        let of_triangle = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|v| self.positions[v as usize]);
+            (a.min(b).min(c), a.max(b).max(c))
+        };
+        let join = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
+        Some(self.triangles.par_iter().map(of_triangle).reduce(|| (first, first), join))
     }
 }

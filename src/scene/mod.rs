@@ -70,6 +70,13 @@ pub struct DroppedTriangles {
     pub zero_area: u64,
 }
 
+impl Scene {
+    /// Whether nothing sends out light.
+    pub fn is_dark(&self) -> bool {
+        self.lights.is_empty() && self.environment.is_black() && !self.materials.iter().any(Material::emits)
+    }
+}
+
 impl DroppedTriangles {
     pub fn total(&self) -> u64 {
         self.non_finite + self.zero_area

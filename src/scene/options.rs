@@ -8,6 +8,8 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::light::LIGHT_MAX;
+
 /// Options of [`super::load`].
 #[derive(Debug, Clone)]
 pub struct LoadOptions {
@@ -89,7 +91,7 @@ impl Detail {
 /// The source of the sky. On the command line it is written `FILE.hdr`, `FILE.exr`, `FILE.exr:LAYER` or `R,G,B`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum EnvironmentSource {
-    /// One radiance for all directions, W·m⁻²·sr⁻¹. Finite and not negative.
+    /// One radiance for all directions, W·m⁻²·sr⁻¹, from 0 to [`LIGHT_MAX`].
     Constant(Vec3),
     /// An equirectangular map whose centre looks along −Z.
     Map {
@@ -109,7 +111,9 @@ pub enum EnvironmentSourceError {
     Form(String),
     #[error("environment '{text}': '{part}' is not a number; write R,G,B such as 1,1,1")]
     Number { text: String, part: String },
-    #[error("environment '{text}': '{part}' is negative or not finite; radiance is a finite number from 0 up")]
+    #[error(
+        "environment '{text}': '{part}' is no radiance that is computed with; give numbers from 0 to {LIGHT_MAX:e}"
+    )]
     Range { text: String, part: String },
 }
 
@@ -137,7 +141,7 @@ impl FromStr for EnvironmentSource {
             *value = part
                 .parse()
                 .map_err(|_| EnvironmentSourceError::Number { text: text.to_owned(), part: part.to_owned() })?;
-            if !value.is_finite() || *value < 0.0 {
+            if !(0.0..=LIGHT_MAX).contains(value) {
                 return Err(EnvironmentSourceError::Range { text: text.to_owned(), part: part.to_owned() });
             }
         }
@@ -163,7 +167,9 @@ mod tests {
 
     #[test]
     fn refuses_the_rest() {
-        for text in ["", "sky.png", "1,2", "1,2,3,4", "1,x,3", "1,-1,0", "nan,0,0", "inf,0,0", "sky.exr:", "sky.hdr:a"]
+        let bright = "1e31,0,0";
+        for text in
+            ["", "sky.png", "1,2", "1,2,3,4", "1,x,3", "1,-1,0", "nan,0,0", "inf,0,0", bright, "sky.exr:", "sky.hdr:a"]
         {
             assert!(text.parse::<EnvironmentSource>().is_err(), "{text}");
         }

@@ -4,6 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::light::World;
+use crate::light::incident::at_bound;
 use crate::light::surface::SurfacePoint;
 use crate::math::random::{Purpose, Random};
 use crate::probe::query::QueryPoint;
@@ -38,6 +39,14 @@ pub struct View {
     pub points: Vec<ImagePoint>,
     /// Per pixel the radiance of the sky × the share of its rays that leave the scene, W·m⁻²·sr⁻¹.
     pub sky: Vec<Vec3>,
+}
+
+impl View {
+    /// How many points get so much from punctual lights that it is clamped, see
+    /// [`LIGHT_MAX`](crate::scene::light::LIGHT_MAX).
+    pub fn clamped(&self) -> u64 {
+        self.points.iter().filter(|point| at_bound(point.irradiance_direct)).count() as u64
+    }
 }
 
 /// Shoots the picture's primary rays, through pixel centres, and the shadow rays of punctual lights.

@@ -114,6 +114,13 @@ impl Reference {
         self.layer(Quantity::IrradianceIndirect.name())
     }
 
+    /// The same over all pixels and channels; `None` without pixels.
+    pub fn irradiance_indirect_mean(&self) -> Option<f64> {
+        let pixels = self.irradiance_indirect();
+        let sum: f64 = pixels.iter().map(|e| e.as_dvec3().element_sum()).sum();
+        (!pixels.is_empty()).then(|| sum / (3 * pixels.len()) as f64)
+    }
+
     /// Variance of each pixel's mean indirect irradiance, per channel, (W·m⁻²)². `None` below two blocks, because a
     /// single block has no spread.
     pub fn irradiance_indirect_variance(&self) -> Option<&[Vec3]> {
@@ -178,6 +185,7 @@ pub struct Tracing<'a> {
     /// The points of the pixels. `None` if they change from block to block.
     view: Option<FixedView>,
     state: State,
+    clamped: u64,
     /// Whether the partial block is done, if one was asked for.
     part_done: bool,
 }
@@ -194,6 +202,7 @@ impl<'a> Tracing<'a> {
     ) -> Tracing<'a> {
         let pixels = width as usize * height as usize;
         let view = see(world, camera, width, height, settings.seed);
+        let clamped = view.clamped();
         let expected = world.expect(view.points.iter().map(|p| world.places.key_of(&p.surface)).collect());
         let view = (!has_blend(world)).then(|| {
             let mut point_of_pixel = vec![NO_POINT; pixels];
@@ -207,7 +216,12 @@ impl<'a> Tracing<'a> {
             non_finite: 0,
             rays: RayCount::default(),
         });
-        Tracing { world, camera, width, height, settings: *settings, expected, view, state, part_done: false }
+        Tracing { world, camera, width, height, settings: *settings, expected, view, state, clamped, part_done: false }
+    }
+
+    /// Points of the picture whose light from punctual lights is clamped.
+    pub fn clamped(&self) -> u64 {
+        self.clamped
     }
 
     /// Number of passes left.

@@ -100,6 +100,11 @@ pub fn count(count: u64) -> String {
     grouped
 }
 
+/// A count with what is counted: "1 seed", "2 seeds".
+pub fn counted(number: u64, one: &str, many: &str) -> String {
+    format!("{number} {}", if number == 1 { one } else { many })
+}
+
 /// The formatted value, or [`UNDEFINED`] for `None`.
 pub fn or_undefined<T>(value: Option<T>, format: impl FnOnce(T) -> String) -> String {
     value.map_or_else(|| UNDEFINED.to_owned(), format)
@@ -185,6 +190,7 @@ mod tests {
         assert_eq!(percent(f64::NAN), "–");
         assert_eq!(count(1_234_567), "1 234 567");
         assert_eq!(count(12), "12");
+        assert_eq!([0, 1, 2].map(|n| counted(n, "seed", "seeds")), ["0 seeds", "1 seed", "2 seeds"]);
         assert_eq!(or_undefined(None, seconds), "–");
         assert_eq!(or_undefined(Some(1.0), seconds), "1.00 s");
     }

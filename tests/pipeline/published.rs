@@ -118,6 +118,10 @@ fn plans_know_the_methods() {
         let number = |key: &str| plan[key].as_f64().unwrap_or_else(|| panic!("{preset}: no {key}"));
         assert!(number("predicted_time_s") > 0.0 && number("predicted_memory_bytes") > 0.0);
         assert!(number("predicted_bounces") >= if preset == "ddgi-2019" { 64.0 } else { 1.0 }, "{preset}: {plan}");
+        // As in a bake's report, all that frames take is capture.
+        assert!(
+            number("predicted_capture_s") > 0.0 && (preset == "ddgi-2019") == (number("predicted_bounce_s") == 0.0)
+        );
     }
 }
 

@@ -155,7 +155,18 @@ fn light_beyond_its_bound_is_clamped_and_counted() {
         }
         assert!(baked.report["bounces"].as_array().expect("a list").iter().all(|b| b["energy"].is_f64()));
         let name = format!("view{number}");
-        render(&folder, &scene, &baked.path, &name, VIEW);
+        let rendered = render(&folder, &scene, &baked.path, &name, VIEW);
+        let path = folder.path().join("bright.exr");
+        let words = format!(
+            "reference {} -o {} --spp 1 --json -q {VIEW} --set lights.punctual_scale={scale}",
+            text(&scene),
+            text(&path)
+        );
+        let traced = succeed(&words.split_whitespace().collect::<Vec<_>>()).json();
+        for report in [&rendered, &traced] {
+            assert!(report["light_clamped"].as_u64().is_some_and(|n| n > 0), "{report}");
+        }
+        assert_eq!(rendered["light_clamped"], traced["light_clamped"]);
         let image = LayeredImage::read_exr(&folder.path().join(name).join("visibility_on.exr")).expect("a picture");
         for layer in ["beauty", "irradiance_direct", "irradiance_indirect"] {
             assert!(image.layer(layer).expect("the layer").iter().all(|v| v.is_finite()), "{layer}");
@@ -165,6 +176,8 @@ fn light_beyond_its_bound_is_clamped_and_counted() {
     let mut gltf = Gltf::new();
     add(&mut gltf, &room(4), diffuse([0.9; 3], [0.0; 3]));
     add_light(&mut gltf, json!({ "type": "point", "intensity": 1e20 }), json!({}));
-    let baked = bake(&folder, &save(gltf, &folder, "merely"), GRID);
+    let scene = save(gltf, &folder, "merely");
+    let baked = bake(&folder, &scene, GRID);
     assert_eq!(baked.report["numerics"]["light_clamped"], 0);
+    assert_eq!(render(&folder, &scene, &baked.path, "merely", VIEW)["light_clamped"], 0);
 }

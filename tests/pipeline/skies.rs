@@ -72,9 +72,15 @@ fn pictures_need_the_turn_and_scale_of_their_bake() {
     let view = ["--look-at", "0,0,0,0,-3,0.1"];
     for words in [&turned[..2], &turned[..4], &["--env", text(&sky), "--env-rotate", "46", "--env-scale", "0.5"]] {
         let message = refuse(&[&render[..], &view, words].concat());
-        assert!(message.contains("--env-rotate and --env-scale"), "{message}");
+        assert!(message.contains("another scene") && message.contains("--env-rotate and --env-scale"), "{message}");
     }
     succeed(&[&render[..], &view, &turned].concat());
+    // Without the map the one thing to say is that it is missing.
+    let message = refuse(&[&render[..], &view].concat());
+    let is_told = message.contains("baked under an environment map of 64×32") && message.contains("give the --env");
+    assert!(is_told && !message.contains("sends out light"), "{message}");
+    let allowed = succeed(&[&render[..], &view, &["--allow-scene-change"]].concat()).stderr;
+    assert!(allowed.contains("an environment map of 64×32") && !allowed.contains("sends out light"), "{allowed}");
 
     // A scaled constant is carried by the probe file, and turning it changes nothing.
     let words = format!("{WORDS} --env 1,2,3 --env-scale 2 --env-rotate 30");
@@ -93,11 +99,50 @@ fn turns_and_scales_are_checked() {
         (&["--env", "1,1,1", "--env-rotate", "nan"][..], "finite number"),
         (&["--env", "1,1,1", "--env-scale", "-1"], "from 0 up"),
         (&["--env", "1,1,1", "--env-scale", "inf"], "from 0 up"),
-        (&["--env-scale", "2"], "--env"),
-        (&["--env-rotate", "2"], "--env"),
+        (&["--env", "1,1,1e31"], "numbers from 0 to 1e30"),
+        (&["--env", "1,1,1", "--env-scale", "1e31"], "brighter than 1e30"),
+        (&["--env-scale", "2"], "there is no --env"),
+        (&["--env-rotate", "2"], "there is no --env"),
+        (&["--env-scale", "2", "--set", "lights.sky=(1,2,0.5)"], "give it as --env 1.0,2.0,0.5 too"),
     ] {
         let ended = run(&[&bake[..], words].concat());
         assert_eq!(ended.code, Some(2), "{words:?}");
         assert!(ended.stderr.contains(expected), "{words:?}: {}", ended.stderr);
+    }
+}
+
+#[test]
+fn maps_that_cannot_be_read_or_are_too_bright() {
+    let folder = Folder::new();
+    let scene = speck(&folder);
+    folder.write("bad.hdr", "no picture");
+    let bad = folder.path().join("bad.hdr");
+    let message = refuse(&["bake", text(&scene), "-o", text(&folder.path().join("a.probes")), "--env", text(&bad)]);
+    assert_eq!(message.matches("cannot read").count(), 1, "{message}");
+    for (bright, words) in
+        [(1, "1 texel of the environment map is brighter"), (2, "2 texels of the environment map are")]
+    {
+        let sky = sky(&folder, |x, y| if y == 0 && x < bright { 1e31 } else { 1.0 });
+        let output = folder.path().join("bright.probes");
+        let line = format!("bake {} -o {} --env {} {WORDS}", text(&scene), text(&output), text(&sky));
+        let told = succeed(&line.split_whitespace().collect::<Vec<_>>()).stderr;
+        assert!(told.contains(words), "{told}");
+    }
+}
+
+/// The same digits for all brightnesses.
+#[test]
+fn listings_show_dim_and_bright_light() {
+    let folder = Folder::new();
+    let scene = speck(&folder);
+    for (radiance, exponent) in [("1e-9", "e-9"), ("1e29", "e29")] {
+        let baked = bake(&folder, &scene, &format!("{WORDS} --env {radiance},{radiance},{radiance}"));
+        let probe = baked.file.active()[0].to_string();
+        let told = succeed(&["inspect", text(&baked.path), "--probe", &probe]).stdout;
+        let line = told.lines().find(|line| line.contains("irradiance +y")).expect("a line");
+        // π times the radiance, but for the rounding of some hundred weights.
+        for figure in line.split_whitespace().skip(2) {
+            assert!(figure.starts_with("3.14") && figure.ends_with(exponent) && figure.len() < 12, "{line}");
+        }
     }
 }

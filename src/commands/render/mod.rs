@@ -13,8 +13,8 @@ use anyhow::{Result, bail};
 use self::check::{check_pictures, check_view, pictures};
 use self::reference::{Reference, Shot, Source};
 use super::camera::cameras;
-use super::session::{Opening, Session, inputs};
-use super::{Console, check_scene, tell, write_json};
+use super::session::{Opening, Probes, Session, inputs};
+use super::{Console, tell, write_json};
 use crate::cli::RenderArgs;
 use crate::config::Config;
 use crate::evaluate::{BakedTruth, Comparison, PATH_RAY, Scenery, Seen, Shaded};
@@ -37,7 +37,6 @@ struct Run<'a> {
     world: &'a World<'a>,
     probes: &'a ProbeFile,
     volume: Volume,
-    scene_changed: bool,
     reference: Option<Source>,
     truth: Option<BakedTruth>,
     accel_build_s: f64,
@@ -49,8 +48,6 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
     let reference = Source::of(args)?;
     let probes = file::read(&args.probes)?;
     let session = Session::open(opening(args, &probes), console)?;
-    let scene_changed =
-        check_scene(&args.probes, &probes, &args.scene, &session.scene, args.allow_scene_change, console)?;
     let (world, accel_build_s) = session.world()?;
     tell::probes(console, &args.probes, &probes);
 
@@ -65,17 +62,7 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
     }
     let volume = probes.volume_as_planned(session.scene.origin_world);
     let truth = if args.bake_error { Some(truth(args, &session, &world, &probes, &volume)) } else { None };
-    let run = Run {
-        args,
-        session: &session,
-        world: &world,
-        probes: &probes,
-        volume,
-        scene_changed,
-        reference,
-        truth,
-        accel_build_s,
-    };
+    let run = Run { args, session: &session, world: &world, probes: &probes, volume, reference, truth, accel_build_s };
     let reports: Vec<RenderReport> =
         cameras.iter().map(|camera| render_camera(&run, camera, &folder(args, camera))).collect::<Result<_>>()?;
     let text = || {
@@ -88,11 +75,12 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
     }
 }
 
-fn opening<'a>(args: &'a RenderArgs, probes: &ProbeFile) -> Opening<'a> {
+fn opening<'a>(args: &'a RenderArgs, probes: &'a ProbeFile) -> Opening<'a> {
     Opening {
         scene: &args.scene,
         trace: &args.trace,
         light: probes.query.light,
+        probes: Some(Probes { path: &args.probes, file: probes, allow_change: args.allow_scene_change }),
         detail: Detail::PICTURE,
         keep_images: false,
         inputs: vec![Named::new("the probe file", &args.probes)],
@@ -137,6 +125,7 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
     let primary_started = Instant::now();
     let view = see(run.world, camera, args.view.size.width, args.view.size.height, session.seed);
     let primary_s = primary_started.elapsed().as_secs_f64();
+    tell::too_bright(session.console, view.clamped(), ["point of the picture", "points of the picture"]);
     bar.inc(1);
     let scenery = Scenery { world: run.world, view: &view, primary_s, seed: session.seed };
     let (masks, masks_s) = scenery.masks(&query);
@@ -171,11 +160,12 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
     let report = RenderReport {
         header: session.header(SCHEMA, "render", run.probes.config.clone()),
         bake_seed: run.probes.seed,
-        scene_changed: run.scene_changed,
+        scene_changed: session.scene_changed,
         camera: camera.name.clone(),
         width: view.width,
         height: view.height,
         points: view.points.len(),
+        light_clamped: session.scene.light_clamped + view.clamped(),
         exposure_ev,
         probes: volume.states.len(),
         probes_active: volume.active_count(),

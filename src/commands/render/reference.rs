@@ -110,9 +110,7 @@ impl Reference {
         let traced = reference::trace(world, camera, width, height, settings, console.progress, None);
         let time_s = started.elapsed().as_secs_f64();
         tell::traced(console, traced.spp, traced.rays, time_s);
-        if traced.non_finite > 0 {
-            console.warn(format!("{} samples of the reference were not finite and count as 0", traced.non_finite));
-        }
+        tell::not_finite(console, traced.non_finite);
         let identity = Identity::new(world, camera, width, height, settings);
         let layers = ReferenceLayers::new(&traced.image, (width, height), Some(traced.spp / BLOCK))?;
         let summary = ReferenceSummary { spp: Some(traced.spp), time_s: Some(time_s), ..Default::default() };

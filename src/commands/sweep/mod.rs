@@ -27,6 +27,7 @@ use crate::shade::regions::regions;
 use crate::sweep::ladder::LadderFile;
 use crate::sweep::run::{Setting, Truths};
 use crate::sweep::store::Store;
+use crate::system::format;
 use crate::system::output::{Named, check_folder, create_folder};
 
 /// Memory that evaluation takes at its peak, per pixel: as a render's with a reference, and the sums over the seeds.
@@ -48,6 +49,7 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
         scene: &args.scene,
         trace: &args.trace,
         light: config.light(),
+        probes: None,
         detail: Detail::PICTURE,
         keep_images,
         inputs: configurations(args, file.as_ref()),
@@ -120,6 +122,7 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
     let contact = sheet::draw(&report, &setting.scenery, &reference.layers, &regions, &shown);
     contact.write_png(&args.output.join(sheet::FILE))?;
     outputs.iter().for_each(|output| tell::written(console, &output.path));
-    let from_before = if work.kept > 0 { format!(", {} runs kept from before", work.kept) } else { String::new() };
+    let kept = format::counted(work.kept as u64, "run", "runs");
+    let from_before = if work.kept > 0 { format!(", {kept} kept from before") } else { String::new() };
     session.print(&report, || format!("{}\nwrote {}{from_before}", table::text(&report), args.output.display()))
 }

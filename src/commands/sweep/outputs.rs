@@ -120,6 +120,7 @@ fn charts(report: &SweepReport) -> [(&'static str, Chart); 4] {
         let seeds = match (report.seeds.len(), report.offsets.len()) {
             (1, 0) => "one seed".to_owned(),
             (n, 0) => format!("mean of {n} seeds, bars from least to most"),
+            (_, 1) => "one offset of the grid".to_owned(),
             (_, n) => format!("geometric mean of {n} offsets of the grid, bars from least to most"),
         };
         Chart {

@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use crate::cli::SweepArgs;
 use crate::commands::reference::{LAYERED_PIXEL_BYTES, PIXEL_BYTES, trace};
-use crate::commands::{Console, check_picture_memory};
+use crate::commands::{Console, check_picture_memory, tell};
 use crate::light::World;
 use crate::math::blocks::BLOCK;
 use crate::report::reference_layers::ReferenceLayers;
@@ -65,9 +65,7 @@ pub fn obtain(
         trace(&mut tracing, &path, &identity, console)?;
     }
     let reference = tracing.develop();
-    if reference.non_finite > 0 {
-        console.warn(format!("{} samples of the reference were not finite and count as 0", reference.non_finite));
-    }
+    tell::not_finite(console, reference.non_finite);
     if new {
         reference.write(&path, &identity)?;
     }

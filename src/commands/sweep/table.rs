@@ -10,14 +10,14 @@ use crate::system::format;
 pub fn text(report: &SweepReport) -> String {
     let mut parts = vec![
         format!(
-            "camera {}, {}×{}, {} seeds{}, reference of {} samples per pixel; error: {}",
+            "camera {}, {}×{}, {}{}, reference of {} samples per pixel; error: {}",
             report.camera,
             report.width,
             report.height,
-            report.seeds.len(),
+            format::counted(report.seeds.len() as u64, "seed", "seeds"),
             match report.offsets.len() {
                 0 => String::new(),
-                n => format!(", geometric means over {n} offsets of the grid"),
+                n => format!(", geometric means over {} of the grid", format::counted(n as u64, "offset", "offsets")),
             },
             format::or_undefined(report.reference.spp, |spp| spp.to_string()),
             report.error_figure,

@@ -217,7 +217,7 @@ impl Emitters {
             return None;
         }
         let target = triangle.shadow_target(receiver.position, on_triangle, cosine);
-        let radiance = triangle.radiance(scene, within);
+        let radiance = triangle.radiance(scene, within, cosine > 0.0);
         Some(LightSample { direction, origin: Origin::Surface(target), radiance, density })
     }
 

@@ -102,7 +102,7 @@ impl EmissiveTriangle {
             per_area: 1.0 / area,
             double_sided: scene.material(index).double_sided,
             constant_radiance: is_constant(scene, index)
-                .then(|| scene.emission(index, Vec2::ZERO) * scene.opacity(index, Vec2::ZERO)),
+                .then(|| scene.uncovered_emission(index, Vec2::ZERO) * scene.opacity(index, Vec2::ZERO)),
             index,
             piece,
         }
@@ -114,12 +114,12 @@ impl EmissiveTriangle {
         self.corner + self.edges[0] * within.x + self.edges[1] * within.y
     }
 
-    /// Emitted radiance × opacity at a point of the piece, W·m⁻²·sr⁻¹.
+    /// Radiance that the front or back of a point of the piece emits, if that side emits, × opacity, W·m⁻²·sr⁻¹.
     #[inline]
-    pub fn radiance(&self, scene: &Scene, within: Vec2) -> Vec3 {
+    pub fn radiance(&self, scene: &Scene, within: Vec2, front: bool) -> Vec3 {
         self.constant_radiance.unwrap_or_else(|| {
             let barycentric = self.piece.barycentric(within);
-            scene.emission(self.index, barycentric) * scene.opacity(self.index, barycentric)
+            scene.emission(self.index, barycentric, front) * scene.opacity(self.index, barycentric)
         })
     }
 
@@ -143,12 +143,16 @@ impl EmissiveTriangle {
         }
     }
 
-    /// Mean luminance of its emission on a grid of points.
+    /// Mean luminance of its emission on a grid of points, of both sides where they may differ.
     fn mean(&self, scene: &Scene) -> f32 {
         let n = if self.constant_radiance.is_some() { 1 } else { POWER_GRID };
         let point = |i: usize| Vec2::new((i % n) as f32 + 0.5, (i / n) as f32 + 0.5) / n as f32;
-        let radiance = |i| luminance(self.radiance(scene, triangle_barycentric(point(i))));
-        (0..n * n).map(radiance).sum::<f32>() / (n * n) as f32
+        let of_side = |front| {
+            let radiance = |i| luminance(self.radiance(scene, triangle_barycentric(point(i)), front));
+            (0..n * n).map(radiance).sum::<f32>() / (n * n) as f32
+        };
+        let sides_differ = self.double_sided && !scene.mesh.covers.of(self.index).is_empty();
+        if sides_differ { 0.5 * (of_side(true) + of_side(false)) } else { of_side(true) }
     }
 }
 

@@ -4,9 +4,9 @@ use glam::{Vec3, Vec3A};
 
 use super::cube::Resampling;
 use super::surfel::{PackedNormal, Surfel};
+use crate::light::incident::{at_bound, bounded};
 use crate::light::sampled::RayCount;
 use crate::math::statistics::Moments;
-use crate::scene::light::LIGHT_MAX;
 
 /// The surfaces in a texel: sums over the rays that met one, each times its share.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -59,16 +59,16 @@ pub struct ProbeCapture {
     pub hits_outside_volume: u64,
     /// Non-finite values found and replaced by zero.
     pub non_finite: u64,
-    /// Hits whose irradiance reaches [`LIGHT_MAX`], and is clamped to it.
+    /// Hits whose irradiance reaches what light is [`bounded`] to, and is clamped to it.
     pub light_clamped: u64,
 }
 
 impl ProbeCapture {
-    /// Irradiance that is at most [`LIGHT_MAX`]; counted where it reaches that.
+    /// Irradiance as [`bounded`]; counted where it reaches the bound.
     pub(super) fn bounded(&mut self, irradiance: Vec3) -> Vec3 {
-        let is_clamped = irradiance.max_element() >= LIGHT_MAX;
+        let is_clamped = at_bound(irradiance);
         self.light_clamped += u64::from(is_clamped);
-        if is_clamped { irradiance.min(Vec3::splat(LIGHT_MAX)) } else { irradiance }
+        if is_clamped { bounded(irradiance) } else { irradiance }
     }
 
     /// Memory that it takes.

@@ -33,6 +33,8 @@ use crate::light::surface::SurfacePoint;
 use crate::math::blocks::{BLOCK, Block};
 use crate::math::random::{KroneckerSequence, Purpose, Random};
 use crate::math::statistics::Moments;
+use crate::probe::lattice::Grid;
+use crate::probe::store::surface::are_in_one_voxel;
 use crate::trace::Ray;
 
 /// How the light of emissive surfaces and the sky reaches the surfaces that probes see.
@@ -104,6 +106,9 @@ pub struct Capture<'w, 's> {
     /// Distances beyond count as this, and so do misses, metres; `None` where no one asks for distances.
     pub distance_clamp_m: Option<f32>,
     pub hit_light: HitLight,
+    /// The grid that hits look probes up in, and the number of voxels along each axis of its cells, in each of which surfaces
+    /// of one facing see the same probes; `None` where no hits are to share a surfel.
+    pub voxels: Option<(&'w Grid, u32)>,
     /// Whether geometric normals of hits are kept.
     pub keeps_geometric: bool,
     /// Whether normals and distances of the surfaces are asked for.
@@ -228,7 +233,7 @@ impl Capture<'_, '_> {
                 match self.hit_light {
                     HitLight::None => {}
                     HitLight::Direct => self.light(ray, surface, surface_samples, &mut random, &mut out),
-                    HitLight::Paths(paths) => self.light_by_paths(index, ray, surface, paths, &mut out),
+                    HitLight::Paths(paths) => self.light_by_paths(index, ray, surface, paths, &mut random, &mut out),
                 }
             }
         }
@@ -315,11 +320,19 @@ impl Capture<'_, '_> {
             out.non_finite += 1;
             direct = Vec3::ZERO;
         }
-        self.keep(surface, direct, ray, out);
+        self.keep(surface, direct, ray, random, out);
     }
 
     /// Lights a hit with all light there is and keeps it, as a surface that reflects none of the probes' light.
-    fn light_by_paths(&self, probe: usize, ray: &TexelRay, surface: &SurfacePoint, paths: u32, out: &mut ProbeCapture) {
+    fn light_by_paths(
+        &self,
+        probe: usize,
+        ray: &TexelRay,
+        surface: &SurfacePoint,
+        paths: u32,
+        random: &mut Random,
+        out: &mut ProbeCapture,
+    ) {
         let world = self.world;
         let normal = surface.shading_normal;
         let settings = PathSettings::default();
@@ -339,14 +352,38 @@ impl Capture<'_, '_> {
         out.rays.shadow += u64::from(shadow_rays);
         let irradiance = punctual + (sum / f64::from(paths.max(1))).as_vec3();
         let radiance = reflected_radiance(surface.albedo, out.bounded(irradiance));
-        self.keep(&SurfacePoint { albedo: Vec3::ZERO, ..*surface }, radiance, ray, out);
+        self.keep(&SurfacePoint { albedo: Vec3::ZERO, ..*surface }, radiance, ray, random, out);
     }
 
+    /// Keeps a hit: as a surfel of its own, or with another ray's of the same texel where both look the same probes up. Bounces
+    /// then ask for the probes' light, which changes little there, less often than rays ask for direct light.
     #[inline]
-    fn keep(&self, surface: &SurfacePoint, radiance: Vec3, ray: &TexelRay, out: &mut ProbeCapture) {
-        out.surfels.push(Surfel::new(surface, radiance, ray.texel, ray.share));
-        if self.keeps_geometric {
-            out.geometric.push(PackedNormal::of(surface.geometric_normal));
+    fn keep(
+        &self,
+        surface: &SurfacePoint,
+        radiance: Vec3,
+        ray: &TexelRay,
+        random: &mut Random,
+        out: &mut ProbeCapture,
+    ) {
+        let surfel = Surfel::new(surface, radiance, ray.texel, ray.share);
+        let of_texel = out.surfels.iter_mut().enumerate().rev().take_while(|(_, known)| known.texel == ray.texel);
+        let asks_alike = |known: &Surfel| {
+            let in_one = |(grid, n)| are_in_one_voxel(grid, n, [known.position, surfel.position]);
+            known.is_like(&surfel) && self.voxels.is_some_and(in_one)
+        };
+        let known = of_texel.into_iter().find(|(_, known)| asks_alike(known));
+        let geometric = || PackedNormal::of(surface.geometric_normal);
+        match known {
+            None => {
+                out.surfels.push(surfel);
+                out.geometric.extend(self.keeps_geometric.then(geometric));
+            }
+            Some((i, known)) => {
+                if known.join(&surfel, random.uniform()) && self.keeps_geometric {
+                    out.geometric[i] = geometric();
+                }
+            }
         }
     }
 

@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use crate::light::surface::SurfacePoint;
+use crate::math::color::luminance;
 use crate::math::octahedral::oct_from_direction;
 use crate::probe::store::surface::Facing;
 
@@ -92,6 +93,27 @@ impl Surfel {
     pub fn albedo(&self) -> Vec3 {
         let [r, g, b] = self.albedo.map(f32::from);
         Vec3::new(r, g, b) * (1.0 / ALBEDO_SCALE)
+    }
+
+    /// Whether both look the same probes up around the same normal, if their positions do.
+    pub fn is_like(&self, other: &Surfel) -> bool {
+        (self.texel, self.normal, self.facing) == (other.texel, other.normal, other.facing)
+    }
+
+    /// Adds a hit of the same kind, and lets one of the two stand for both: which it is, `chance` (uniform, below 1) decides by
+    /// the light that each reflects. The mean of what bounces is that of two surfels, and direct light is the sum. Returns
+    /// whether it is the new one.
+    pub fn join(&mut self, other: &Surfel, chance: f32) -> bool {
+        let (known, new) = (luminance(self.albedo()), luminance(other.albedo()));
+        let takes_place = chance * (known + new) >= known;
+        self.direct_radiance += other.direct_radiance;
+        for (sum, albedo) in self.albedo.iter_mut().zip(other.albedo) {
+            *sum = sum.saturating_add(albedo);
+        }
+        if takes_place {
+            self.position = other.position;
+        }
+        takes_place
     }
 
     /// The same surface in another texel, with the albedo and the direct radiance of that.

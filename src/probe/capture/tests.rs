@@ -29,6 +29,7 @@ fn capture<'a>(
         settings,
         distance_clamp_m: Some(10.0),
         hit_light,
+        voxels: None,
         keeps_geometric: true,
         sees: true,
         resampling,

@@ -9,8 +9,8 @@ use crate::probe::Volume;
 use crate::probe::query::{Part, Query, QuerySettings};
 use crate::probe::store::irradiance::Factors;
 
-/// Unknowns of a probe up to which blocks of the normal equations are small beside the rows: those of harmonics with a gradient are 12. Maps have
-/// many more, of which a row asks four.
+/// Unknowns of a probe up to which blocks of the normal equations are small beside the rows: those of harmonics with a
+/// gradient are 12. Maps have many more, of which a row asks four.
 pub const MOST_UNKNOWNS: usize = 16;
 
 /// One point's look-up, what it should give and how much that counts.
@@ -23,7 +23,8 @@ pub struct Row {
 }
 
 impl Row {
-    /// Most bytes that one takes: eight parts, twice while they are collected, their lists by probe and factors, and what is known of the point.
+    /// Most bytes that one takes: eight parts, twice while they are collected, their lists by probe and factors, and what is
+    /// known of the point.
     pub const BYTES: u64 = (8 * (2 * size_of::<Part>() + 2 * size_of::<u32>() + MOST_UNKNOWNS * size_of::<f32>())
         + size_of::<Row>()
         + 256) as u64;

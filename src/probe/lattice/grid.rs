@@ -346,7 +346,7 @@ impl Grid {
 
     /// Cells that a box meets, x fastest; `margin` in cells is added on every side. A box beyond the hull meets the cells
     /// at its rim, which points there use.
-    pub fn cells_near(&self, low: Vec3, high: Vec3, margin: f32) -> impl Iterator<Item = CellIndex> + '_ {
+    pub fn cells_near(&self, low: Vec3, high: Vec3, margin: f32) -> impl Iterator<Item = CellIndex> + Clone {
         let last = self.cells_along() - UVec3::ONE;
         let cell = |g: Vec3| g.floor().max(Vec3::ZERO).as_uvec3().min(last);
         let (low, high) = (self.grid_from_scene(low) - margin, self.grid_from_scene(high) + margin);
@@ -380,7 +380,7 @@ impl Grid {
 }
 
 /// All coordinates from `low` to `high`, both included, x fastest.
-fn block(low: UVec3, high: UVec3) -> impl Iterator<Item = UVec3> {
+pub fn block(low: UVec3, high: UVec3) -> impl Iterator<Item = UVec3> + Clone {
     (low.z..=high.z)
         .flat_map(move |z| (low.y..=high.y).flat_map(move |y| (low.x..=high.x).map(move |x| UVec3::new(x, y, z))))
 }

@@ -5,7 +5,6 @@ use rayon::prelude::*;
 
 use super::placement::Placement;
 use crate::light::World;
-use crate::light::contact::Contacts;
 use crate::probe::lattice::Grid;
 use crate::probe::lattice::grid::CellIndex;
 use crate::probe::store::regions::air_places;
@@ -31,7 +30,6 @@ pub fn bounds(world: &World, grid: &Grid) -> (Vec3, Vec3) {
 
 /// Which of their cell's probes places in the air see, for each cell that has surfaces, and the rays that told.
 pub fn seen(world: &World, grid: &Grid, placement: &Placement, table: &SurfaceVisibility) -> (Vec<Vec<u8>>, u64) {
-    let contacts = Contacts::of_points(world.scene, &placement.positions);
     let of_cell = |cell: u32| {
         let cell = CellIndex(cell);
         let active = active_corners(grid, &placement.states, cell);
@@ -42,7 +40,7 @@ pub fn seen(world: &World, grid: &Grid, placement: &Placement, table: &SurfaceVi
         let sees = |place: Vec3, corner: usize| {
             let (probe, place) = (probes[corner].0 as usize, low + place * sides);
             let position = placement.positions[probe];
-            let start = contacts.of(probe).map_or(position, |contact| contact.target(place));
+            let start = placement.contacts.of(probe).map_or(position, |contact| contact.target(place));
             active >> corner & 1 == 1 && !world.tracer.occluded(Ray::segment(start, place, 0))
         };
         let mask = |place| (0..8).fold(0, |mask, corner| mask | u8::from(sees(place, corner)) << corner);

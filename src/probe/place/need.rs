@@ -16,7 +16,6 @@ use super::settings::SurveySettings;
 use super::settle::Settler;
 use super::survey::Survey;
 use crate::light::World;
-use crate::light::contact::Contacts;
 use crate::probe::lattice::ProbeState;
 use crate::probe::lattice::grid::{CellIndex, Grid, ProbeIndex};
 use crate::probe::store::surface::{Entry, SurfaceVisibility};
@@ -89,9 +88,9 @@ pub fn relocate(
             tried.find_map(|need| place_beside(settler, need)).map(|position| (probe, position))
         })
         .collect();
-    for &(probe, position) in &moves {
-        placement.states[probe] = ProbeState::Active;
-        placement.positions[probe] = position;
+    moves.iter().for_each(|&(probe, _)| placement.states[probe] = ProbeState::Active);
+    if !moves.is_empty() {
+        placement.move_to(settler.world.scene, moves.iter().copied());
     }
     placement.relocated += moves.len();
     moves.into_iter().map(|(probe, _)| probe).collect()
@@ -128,7 +127,6 @@ pub fn far_probes(
     table: &SurfaceVisibility,
     settings: &SurveySettings,
 ) -> Vec<(u32, u32)> {
-    let contacts = Contacts::of_points(world.scene, &placement.positions);
     let of_cell = |cell: u32| -> Vec<(u32, u32)> {
         let cell = CellIndex(cell);
         let in_need: Vec<Entry> = table.entries(cell).filter(|entry| entry.mask == 0).collect();
@@ -143,8 +141,7 @@ pub fn far_probes(
             .par_iter()
             .filter_map(|entry| {
                 let need = need(world, grid, table, cell, entry, settings.voxel_margin);
-                let seen =
-                    rings.iter().find_map(|ring| nearest_visible(&world.tracer, placement, &contacts, ring, &need))?;
+                let seen = rings.iter().find_map(|ring| nearest_visible(&world.tracer, placement, ring, &need))?;
                 Some((entry.index as u32, seen.0))
             })
             .collect()
@@ -154,19 +151,14 @@ pub fn far_probes(
 }
 
 /// The nearest of some probes that a surface sees.
-fn nearest_visible(
-    tracer: &Tracer,
-    placement: &Placement,
-    contacts: &Contacts,
-    probes: &[ProbeIndex],
-    need: &Need,
-) -> Option<ProbeIndex> {
+fn nearest_visible(tracer: &Tracer, placement: &Placement, probes: &[ProbeIndex], need: &Need) -> Option<ProbeIndex> {
     let position = |probe: ProbeIndex| placement.positions[probe.0 as usize];
     // Bits of numbers that are not negative are in their order.
     let distance = |probe: ProbeIndex| position(probe).distance_squared(need.point).to_bits();
     let before = probes.iter().copied().filter(|&p| (position(p) - need.point).dot(need.normal) > 0.0);
     let mut nearest: BinaryHeap<Reverse<(u32, ProbeIndex)>> = before.map(|p| Reverse((distance(p), p))).collect();
-    let start = |p: ProbeIndex| contacts.of(p.0 as usize).map_or(position(p), |contact| contact.target(need.point));
+    let start =
+        |p: ProbeIndex| placement.contacts.of(p.0 as usize).map_or(position(p), |contact| contact.target(need.point));
     std::iter::from_fn(|| nearest.pop())
         .map(|Reverse((_, probe))| probe)
         .find(|&p| !tracer.occluded(Ray::segment(start(p), need.point, 0)))

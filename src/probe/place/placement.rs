@@ -3,10 +3,12 @@
 use glam::Vec3;
 
 use super::settings::PlacementSettings;
+use crate::light::contact::Contacts;
 use crate::probe::lattice::{Grid, ProbeState};
 use crate::probe::store::OcclusionStore;
 use crate::probe::store::regions::Regions;
 use crate::probe::store::surface::SurfaceVisibility;
+use crate::scene::Scene;
 
 /// The probes before they are captured.
 #[derive(Debug, Clone)]
@@ -14,6 +16,8 @@ pub struct Placement {
     pub states: Vec<ProbeState>,
     /// Relative to the scene's origin, metres.
     pub positions: Vec<Vec3>,
+    /// The probes that lie in a surface.
+    pub contacts: Contacts,
     /// Whether any surface lies in the probe's cells.
     pub sampled: Vec<bool>,
     /// Whether any surface can ask the probe: the others are baked for whom wants them, and must change nothing.
@@ -37,6 +41,14 @@ pub struct PlacementTask<'a> {
 }
 
 impl Placement {
+    /// Puts probes elsewhere.
+    pub fn move_to(&mut self, scene: &Scene, places: impl IntoIterator<Item = (usize, Vec3)>) {
+        for (probe, position) in places {
+            self.positions[probe] = position;
+        }
+        self.contacts = Contacts::of_points(scene, &self.positions);
+    }
+
     pub fn count(&self, state: ProbeState) -> usize {
         self.states.iter().filter(|&&s| s == state).count()
     }

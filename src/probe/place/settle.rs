@@ -66,16 +66,21 @@ pub fn settle_all(world: &World, task: &PlacementTask) -> Placement {
     };
     let found: Vec<Settled> = (0..grid.probe_count()).into_par_iter().map(of_probe).collect();
     let active = || found.iter().zip(&sampled).filter(|(f, _)| f.state == ProbeState::Active);
-    Placement {
+    let mut placement = Placement {
         relocated: active().filter(|(f, _)| f.moved).count(),
         rays: found.iter().map(|f| f.rays).sum(),
         states: found.iter().map(|f| f.state).collect(),
-        positions: found.iter().map(|f| f.position).collect(),
+        positions: grid_points,
+        contacts,
         asked: sampled.clone(),
         sampled,
         survey: None,
         regions: None,
+    };
+    if found.iter().any(|f| f.moved) {
+        placement.move_to(world.scene, found.iter().map(|f| f.position).enumerate());
     }
+    placement
 }
 
 /// Classifies a probe and, where that helps, moves it.

@@ -11,9 +11,9 @@ use super::piece::Piece;
 use super::placement::Placement;
 use super::settings::SurveySettings;
 use crate::light::World;
-use crate::light::contact::{Contacts, Facet, sight_line};
+use crate::light::contact::{Facet, sight_line};
 use crate::math::random::{KroneckerSequence, Purpose, Random, unit_from_bits};
-use crate::probe::lattice::grid::{CellIndex, Grid, ProbeIndex};
+use crate::probe::lattice::grid::{CellIndex, Grid, ProbeIndex, block};
 use crate::probe::store::surface::{Facing, SurfaceVisibility, active_corners, key, voxel_of_key};
 use crate::scene::{Mesh, TriangleIndex};
 use crate::trace::Ray;
@@ -58,6 +58,13 @@ struct Side {
     key: u16,
     /// Whether this is the back of the triangle.
     is_back: bool,
+}
+
+impl Side {
+    /// By cell, key and triangle. As one number, which compares without a branch.
+    fn order(&self) -> u128 {
+        u128::from(self.cell.0) << 48 | u128::from(self.key) << 32 | u128::from(self.triangle)
+    }
 }
 
 /// What points of a voxel's surfaces see.
@@ -110,12 +117,10 @@ impl<'a, 's> Surveyor<'a, 's> {
         let mut surveyor = Surveyor { world, grid, n: voxels_per_cell, settings, sides: Vec::new() };
         // One triangle may be a whole floor: its cells are work for all threads.
         let triangles = world.scene.mesh.triangles.len() as u32;
-        let met: Vec<(u32, CellIndex)> = (0..triangles)
-            .into_par_iter()
-            .flat_map_iter(|t| surveyor.cells_of(t).into_iter().map(move |cell| (t, cell)))
-            .collect();
+        let cells_of = |t: u32| surveyor.cells_of(t).map(move |cell| (t, cell));
+        let met: Vec<(u32, CellIndex)> = (0..triangles).into_par_iter().flat_map_iter(cells_of).collect();
         surveyor.sides = met.par_iter().flat_map_iter(|&(t, cell)| surveyor.sides_in(t, cell)).collect();
-        surveyor.sides.par_sort_unstable_by_key(|e| (e.cell, e.key, e.triangle));
+        surveyor.sides.par_sort_unstable_by_key(Side::order);
         surveyor
     }
 
@@ -129,27 +134,22 @@ impl<'a, 's> Surveyor<'a, 's> {
     }
 
     /// Cells that a triangle meets.
-    fn cells_of(&self, triangle: u32) -> Vec<CellIndex> {
+    fn cells_of(&self, triangle: u32) -> impl Iterator<Item = CellIndex> {
         let corners = self.mesh().corners(TriangleIndex(triangle));
         let (low, high) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
         let margin = self.margin();
         let (beyond, _) = self.grid.is_beyond(low, high, margin);
-        if beyond {
-            return Vec::new();
-        }
-        let mut cells: Vec<CellIndex> = self.grid.cells_near(low, high, margin).collect();
+        let cells = (!beyond).then(|| self.grid.cells_near(low, high, margin)).into_iter().flatten();
         // The box of a small triangle is in one cell, and so is it.
-        if cells.len() > 1 {
-            cells.retain(|&cell| {
-                let local = corners.map(|c| self.grid.cell_from_scene(cell, c) - 0.5);
-                triangle_meets_box(local, Vec3::splat(0.5 + margin))
-            });
-        }
-        cells
+        let within = cells.clone().nth(1).is_none();
+        cells.filter(move |&cell| {
+            let local = || corners.map(|c| self.grid.cell_from_scene(cell, c) - 0.5);
+            within || triangle_meets_box(local(), Vec3::splat(0.5 + margin))
+        })
     }
 
     /// Both sides of a triangle in every voxel of a cell that it meets.
-    fn sides_in(&self, triangle: u32, cell: CellIndex) -> Vec<Side> {
+    fn sides_in(&self, triangle: u32, cell: CellIndex) -> impl Iterator<Item = Side> {
         let margin = self.settings.voxel_margin;
         let scaled = self.mesh().corners(TriangleIndex(triangle)).map(|c| self.in_voxels(cell, c));
         let low = scaled[0].min(scaled[1]).min(scaled[2]) - margin;
@@ -157,22 +157,17 @@ impl<'a, 's> Surveyor<'a, 's> {
         let last = UVec3::splat(self.n - 1);
         let (low, high) = (low.max(Vec3::ZERO).as_uvec3().min(last), high.max(Vec3::ZERO).as_uvec3().min(last));
         let front = Facing::of(self.mesh().geometric_normal(TriangleIndex(triangle)));
-        let mut out = Vec::new();
         // Small triangles are wholly in one voxel.
         let within = low == high;
-        for z in low.z..=high.z {
-            for y in low.y..=high.y {
-                for x in low.x..=high.x {
-                    let voxel = UVec3::new(x, y, z);
-                    let centre = voxel.as_vec3() + 0.5;
-                    if within || triangle_meets_box(scaled.map(|c| c - centre), Vec3::splat(0.5 + margin)) {
-                        let side = |is_back, facing| Side { cell, triangle, key: key(voxel, facing, self.n), is_back };
-                        out.extend([side(false, front), side(true, front.opposite())]);
-                    }
-                }
-            }
-        }
-        out
+        let meets = move |voxel: &UVec3| {
+            let centre = voxel.as_vec3() + 0.5;
+            within || triangle_meets_box(scaled.map(|c| c - centre), Vec3::splat(0.5 + margin))
+        };
+        let n = self.n;
+        block(low, high).filter(meets).flat_map(move |voxel| {
+            let side = |is_back, facing| Side { cell, triangle, key: key(voxel, facing, n), is_back };
+            [side(false, front), side(true, front.opposite())]
+        })
     }
 
     /// A position in units of a cell's voxels.
@@ -182,7 +177,6 @@ impl<'a, 's> Surveyor<'a, 's> {
 
     /// What surfaces see of these probes. Of the cells around none of the `moved` probes, what an earlier survey found.
     pub fn survey(&self, placement: &Placement, earlier: Option<(&Survey, &[usize])>) -> Survey {
-        let contacts = Contacts::of_points(self.world.scene, &placement.positions);
         let mut stale = vec![earlier.is_none(); self.grid.cell_count()];
         for &probe in earlier.iter().flat_map(|(_, moved)| *moved) {
             self.grid.cells_of(ProbeIndex(probe as u32)).for_each(|cell| stale[cell.0 as usize] = true);
@@ -192,7 +186,7 @@ impl<'a, 's> Surveyor<'a, 's> {
             .chunk_by(|a, b| (a.cell, a.key) == (b.cell, b.key))
             .filter(|group| stale[group[0].cell.0 as usize])
             .collect();
-        let look = |group: &&[Side]| Look { surveyor: self, placement, contacts: &contacts, group }.look();
+        let look = |group: &&[Side]| Look { surveyor: self, placement, group }.look();
         let found: Vec<Found> = groups.par_iter().map(look).collect();
         let mut table = SurfaceVisibility { voxels_per_cell: self.n, ..Default::default() };
         let mut fronts = Vec::new();
@@ -220,7 +214,6 @@ impl<'a, 's> Surveyor<'a, 's> {
 struct Look<'a, 's> {
     surveyor: &'a Surveyor<'a, 's>,
     placement: &'a Placement,
-    contacts: &'a Contacts,
     group: &'a [Side],
 }
 
@@ -241,26 +234,22 @@ impl Look<'_, '_> {
             let corners = self.surveyor.mesh().corners(TriangleIndex(side.triangle));
             Piece::new(corners.map(|c| self.surveyor.in_voxels(cell, c) - centre), settings.voxel_margin)
         };
-        let (mut outside, mut backs, mut touching) = (Vec::new(), Vec::new(), Vec::new());
-        for side in self.group {
-            let piece = piece(side);
-            let list = match piece.area > 0.0 {
-                false => &mut touching,
-                true if is_outside(side) => &mut outside,
-                true => &mut backs,
+        let all = |counts: &dyn Fn(&Side) -> bool, has_area: bool| -> Vec<(&Side, Piece)> {
+            let pieces = self.group.iter().filter(|side| counts(side)).map(|side| (side, piece(side)));
+            pieces.filter(|(_, piece)| (piece.area > 0.0) == has_area).collect()
+        };
+        // Outsides, backs, and what but touches the voxel: the next only where those before see no probe.
+        for tier in 0..3 {
+            let (pieces, search) = match tier {
+                0 => (all(&is_outside, true), settings.search_points),
+                1 => (all(&|side| !is_outside(side), true), settings.first_points),
+                _ => (all(&|_| true, false), settings.first_points),
             };
-            list.push((side, piece));
-        }
-        found.asks = !outside.is_empty();
-        for (tier, (pieces, search)) in
-            [(outside, settings.search_points), (backs, settings.first_points), (touching, settings.first_points)]
-                .iter()
-                .enumerate()
-        {
+            found.asks |= tier == 0 && !pieces.is_empty();
             if pieces.is_empty() {
                 continue;
             }
-            let tally = self.tally(pieces, active, *search, tier as u64);
+            let tally = self.tally(&pieces, active, search, tier);
             found.rays += tally.rays;
             if tally.points > 0 {
                 found.mask = tally.majority();
@@ -310,7 +299,7 @@ impl Look<'_, '_> {
             let mut seen = 0u8;
             for (corner, probe) in probes.iter().enumerate().filter(|(corner, _)| active >> corner & 1 == 1) {
                 let probe = probe.0 as usize;
-                let line = sight_line(&facet, self.placement.positions[probe], self.contacts.of(probe));
+                let line = sight_line(&facet, self.placement.positions[probe], self.placement.contacts.of(probe));
                 let Some((origin, target)) = line else { continue };
                 tally.rays += 1;
                 // From the surface: most rays that are blocked are blocked near it, where walls and solids meet, and

@@ -199,7 +199,7 @@ fn a_survey_is_renewed_where_probes_moved() {
     let moved = [nearest[0], nearest[1]];
     // Behind the walls.
     let outside = scene.mesh.bounds().unwrap().0 - Vec3::ONE;
-    moved.iter().for_each(|&probe| placement.positions[probe] = outside);
+    placement.move_to(world.scene, moved.iter().map(|&probe| (probe, outside)));
     let (renewed, anew) = (surveyor.survey(&placement, Some((&before, &moved))), surveyor.survey(&placement, None));
     assert!(renewed.table == anew.table, "the tables differ");
     assert_eq!(renewed.fronts, anew.fronts);

@@ -181,7 +181,10 @@ impl QuerySettings {
         let (test, written) = store.test();
         let name = store.name();
         if self.test.name() != test {
-            return Some(format!("store.occlusion is {name}: query.test must be {written}"));
+            let other = self.test.stores();
+            return Some(format!(
+                "store.occlusion is {name}: query.test must be {written}; or make store.occlusion {other}"
+            ));
         }
         let blind = self.look_up == LookUp::Towards && !store.knows_distances();
         blind.then(|| format!("store.occlusion is {name} and knows no distances: query.look_up must be normal"))
@@ -232,6 +235,15 @@ impl VisibilityTest {
             VisibilityTest::None => "none",
             VisibilityTest::Chebyshev { .. } => "chebyshev",
             VisibilityTest::Table(_) | VisibilityTest::Everywhere(_) => "table",
+        }
+    }
+
+    /// What it can be asked of, as it is written in configurations.
+    fn stores(&self) -> &'static str {
+        match self {
+            VisibilityTest::None => "none",
+            VisibilityTest::Chebyshev { .. } => "moments() or tiles()",
+            VisibilityTest::Table(_) | VisibilityTest::Everywhere(_) => "surface()",
         }
     }
 }

@@ -42,7 +42,8 @@ impl Default for SurfaceStore {
 #[serde(default, deny_unknown_fields)]
 pub struct TableTest {
     /// Of a file that holds entries alone: where the survey found no surface of this facing in a point's own voxel, the
-    /// nearest entry within this many voxels stands in. 1 or 6: no change of leaks above 1e-4 in the six scenes of [`crate::probe::place`]'s settings.
+    /// nearest entry within this many voxels stands in. 1 or 6: no change of leaks above 1e-4 in the six scenes of
+    /// [`crate::probe::place`]'s settings.
     pub reach_voxels: u32,
     /// Points nearer to a voxel's border than this share of its side may use the voxel beyond, where their own sees no
     /// probe: where walls meet, the survey may miss a strip much narrower than a voxel. 0.1 or 0.5: at most 3e-4 (thin_wall).
@@ -208,6 +209,13 @@ pub fn beside(fraction: Vec3, n: u32, strip: f32, mask: impl Fn(UVec3) -> u8) ->
 #[inline]
 pub fn voxel_of(fraction: Vec3, n: u32) -> UVec3 {
     (fraction * n as f32).as_uvec3().min(UVec3::splat(n - 1))
+}
+
+/// Whether two points lie in the same voxel of the same cell, `n` voxels along each axis of a cell: where both face the same way
+/// they see the same probes.
+pub fn are_in_one_voxel(grid: &Grid, n: u32, points: [Vec3; 2]) -> bool {
+    let [a, b] = points.map(|point| grid.cell(point));
+    grid.cell_index(&a) == grid.cell_index(&b) && voxel_of(a.fraction, n) == voxel_of(b.fraction, n)
 }
 
 pub fn key(voxel: UVec3, facing: Facing, n: u32) -> u16 {

@@ -78,7 +78,7 @@ pub fn read(path: &Path, identity: &str, volume: &mut Volume) -> Result<Progress
         let values = field(&container, &format!("{FIELD}{name}"));
         fields.insert(name.to_owned(), values.ok_or_else(|| unusable("a tensor of it is unreadable"))?);
     }
-    Ok(Progress { solution, control, history, fields, is_partial: false })
+    Ok(Progress { solution, control, history, fields })
 }
 
 fn history(container: &Container, noise: &str, unknowns: usize, group: usize) -> Option<History> {

@@ -120,8 +120,6 @@ pub struct Progress {
     pub history: Option<History>,
     /// What else a checkpoint must hold, by name.
     pub fields: BTreeMap<String, Field>,
-    /// Whether there is state that neither this nor the volume's irradiance holds, so that no checkpoint can be made.
-    pub is_partial: bool,
 }
 
 /// What an iteration changed, per channel where it is a vector.

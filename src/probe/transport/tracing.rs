@@ -7,12 +7,14 @@
 //! rejected, nothing is known and nothing added. A cross-bilateral filter over each probe's map takes the noise of the single
 //! rays away. What is stored is the sum of all I_k.
 //!
-//! Memory: three colours for every texel of all probes, beside the light field and the captures.
+//! Memory: four colours for every texel of all probes, beside the light field and the captures.
+
+use std::collections::BTreeMap;
 
 use glam::{Vec2, Vec3, Vec3A};
 use rayon::prelude::*;
 
-use super::operator::{Captures, Operator, Scenery};
+use super::operator::{Captures, Field, Operator, Scenery};
 use super::settings::{TracingFilter, TracingSettings};
 use super::solver::{Bounce, Progress, Solution, Stopped};
 use crate::math::color::luminance;
@@ -26,6 +28,11 @@ use crate::probe::query::trilinear;
 use crate::probe::store::map::{OctahedralMaps, fill_with_border, interior_texel};
 use crate::probe::store::radiance::FAR_M;
 use crate::trace::Ray;
+
+/// Names of what a checkpoint holds, the texels of the active probes one after another: the last reflection, and the sum of
+/// all with the light before any.
+const LAST: &str = "last";
+const SUM: &str = "sum";
 
 /// Traces until next to nothing is added. Without a scene or a light field there is nothing to trace.
 pub fn solve<C: Captures>(
@@ -43,11 +50,21 @@ pub fn solve<C: Captures>(
     let (resolution, border) = (last.resolution, last.border);
     let interior = interior_texel(resolution, border);
     let texels = resolution * resolution;
-    let mut total: Vec<Vec<Vec3>> =
-        active.iter().map(|&p| (0..texels).map(|o| last.probe(p)[interior(o)]).collect()).collect();
+    let is_whole = |name| progress.fields.get(name).is_some_and(|field| field.len() == active.len() * texels);
+    if is_whole(LAST) && is_whole(SUM) {
+        for (&p, light) in active.iter().zip(progress.fields[LAST].chunks(texels)) {
+            fill_with_border(light, resolution, border, last.probe_mut(p));
+        }
+    } else {
+        let stored = |&p: &usize| (0..texels).map(|o| last.probe(p)[interior(o)]).collect::<Field>();
+        let sum = active.iter().flat_map(stored).collect();
+        progress = Progress { fields: BTreeMap::from([(SUM.to_owned(), sum)]), ..Progress::default() };
+    }
     let tracing = Tracing { operator, scenery: &scenery, volume, offset: Tracing::<C>::offset(&scenery) };
-    progress.is_partial = true;
-    for index in 1..=settings.iterations {
+    for index in progress.solution.bounces.len() as u32 + 1..=settings.iterations {
+        if progress.solution.converged {
+            break;
+        }
         let of_probe = |&p: &usize| {
             let (light, lost) = tracing.reflect(p, &last, index);
             let filtered = filter(&settings.filter, field_of(volume, p).as_ref(), resolution, &light);
@@ -55,9 +72,11 @@ pub fn solve<C: Captures>(
         };
         let found: Vec<(Vec<Vec3>, u64)> = active.par_iter().map(of_probe).collect();
         let (mut largest, mut change, mut energy) = (0.0f32, 0.0f32, 0.0);
-        for ((&p, (light, lost)), total) in active.iter().zip(&found).zip(&mut total) {
-            progress.solution.non_finite += lost;
-            progress.solution.rays.0 += operator.captures.with(p, |capture| capture.surfels.len()) as u64;
+        let Progress { solution, fields, .. } = &mut progress;
+        let sum = fields.entry(SUM.to_owned()).or_default();
+        for ((&p, (light, lost)), total) in active.iter().zip(&found).zip(sum.chunks_mut(texels)) {
+            solution.non_finite += lost;
+            solution.rays.0 += operator.captures.with(p, |capture| capture.surfels.len()) as u64;
             fill_with_border(light, resolution, border, last.probe_mut(p));
             for (total, light) in total.iter_mut().zip(light) {
                 *total += *light;
@@ -68,21 +87,20 @@ pub fn solve<C: Captures>(
         }
         let residual = if largest > 0.0 { f64::from(change) / f64::from(largest) } else { 0.0 };
         let energy = std::f64::consts::PI * energy / (texels * active.len()).max(1) as f64;
-        progress.solution.bounces.push(Bounce { index, residual, energy, accelerated: false });
-        progress.solution.converged = residual < f64::from(settings.tolerance);
+        solution.bounces.push(Bounce { index, residual, energy, accelerated: false });
+        solution.converged = residual < f64::from(settings.tolerance);
+        fields.insert(LAST.to_owned(), found.into_iter().flat_map(|(light, _)| light).collect());
         on_iteration(&progress, volume);
-        if progress.solution.converged {
-            break;
-        }
     }
-    keep(operator, volume, &active, &total);
+    let sum = progress.fields.remove(SUM).unwrap_or_default();
+    keep(operator, volume, &active, &sum.chunks(texels).collect::<Vec<_>>());
     let solution = progress.solution;
     let stopped = if solution.converged { Stopped::Settled } else { Stopped::Limit };
     Solution { stopped: Some(stopped), ..solution }
 }
 
 /// Stores the radiance of the active probes, and the irradiance that it makes.
-fn keep<C: Captures>(operator: &Operator<C>, volume: &mut Volume, active: &[usize], total: &[Vec<Vec3>]) {
+fn keep<C: Captures>(operator: &Operator<C>, volume: &mut Volume, active: &[usize], total: &[&[Vec3]]) {
     let mut place = vec![None; volume.states.len()];
     active.iter().enumerate().for_each(|(i, &p)| place[p] = Some(i));
     volume.irradiance.set_each(|p, _| {

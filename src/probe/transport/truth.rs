@@ -50,6 +50,7 @@ impl Truth {
                 settings,
                 distance_clamp_m: None,
                 hit_light: HitLight::Paths(paths),
+                voxels: None,
                 keeps_geometric: false,
                 sees: false,
                 resampling: resampling.as_ref(),

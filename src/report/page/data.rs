@@ -55,8 +55,8 @@ pub enum PageError {
         "the page of the comparison cannot show {name}: {base} pixels of base, {candidate} of candidate; report this"
     )]
     Size { name: String, base: usize, candidate: usize },
-    #[error("the page of the comparison cannot be packed: {0}; report this")]
+    #[error("the page of the comparison cannot be packed (report this)")]
     Pack(#[from] io::Error),
-    #[error("the page of the comparison cannot be written: {0}; report this")]
+    #[error("the page of the comparison cannot be written (report this)")]
     Template(#[from] minijinja::Error),
 }

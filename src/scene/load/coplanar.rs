@@ -85,13 +85,14 @@ fn overlaps(mesh: &Mesh, materials: &[Material]) -> Vec<(TriangleIndex, Triangle
     pairs
 }
 
-/// Whether emitter `a` goes before emitter `b`: by brightness, then by the places of the corners, and only between
-/// triangles with the same corners by their numbers.
+/// Whether emitter `a` goes before emitter `b`: by brightness, then by the places of the corners, then by colour, and only
+/// between triangles that are alike in all of this by their numbers.
 fn precedes(mesh: &Mesh, materials: &[Material], a: TriangleIndex, b: TriangleIndex) -> bool {
-    let brightness = |t: TriangleIndex| {
+    let color = |t: TriangleIndex| {
         let material = &materials[mesh.materials[t.0 as usize].0 as usize];
-        luminance(if material.unlit { material.base_color.truncate() } else { material.emission })
+        if material.unlit { material.base_color.truncate() } else { material.emission }
     };
+    let brightness = |t: TriangleIndex| luminance(color(t));
     let corners = |t: TriangleIndex| {
         let mut corners = mesh.corners(t).map(|c| c.to_array());
         corners.sort_by(compare);
@@ -101,7 +102,8 @@ fn precedes(mesh: &Mesh, materials: &[Material], a: TriangleIndex, b: TriangleIn
         let (a, b) = (corners(a), corners(b));
         a.iter().zip(&b).map(|(p, q)| compare(p, q)).find(|o| o.is_ne()).unwrap_or(Ordering::Equal)
     };
-    brightness(b).total_cmp(&brightness(a)).then_with(by_corners).then(a.cmp(&b)).is_lt()
+    let by_color = || compare(&color(b).to_array(), &color(a).to_array());
+    brightness(b).total_cmp(&brightness(a)).then_with(by_corners).then_with(by_color).then(a.cmp(&b)).is_lt()
 }
 
 fn compare(p: &[f32; 3], q: &[f32; 3]) -> Ordering {

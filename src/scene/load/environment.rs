@@ -9,6 +9,7 @@ use crate::image::Picture;
 use crate::scene::environment::{Environment, EnvironmentMap};
 use crate::scene::error::SceneError;
 use crate::scene::options::{EnvironmentSource, LoadOptions};
+use crate::system::format;
 
 /// Most texels of a map: 8192 × 4096, which take 384 MiB.
 const MAX_TEXELS: u64 = 1 << 25;
@@ -37,7 +38,7 @@ pub(super) fn load(
             let scaled = *radiance * scale;
             let [r, g, b] = scaled.to_array();
             if !scaled.is_finite() || scaled.min_element() < 0.0 {
-                let what = format!("its radiance {r},{g},{b} is negative or not finite");
+                let what = format!("its radiance {r:?},{g:?},{b:?} is negative or not finite");
                 return Err(error(Path::new("sky"), what, "give finite radiance and scale from 0 up"));
             }
             // The scaled radiance alone is the sky: by which factors it came does not matter.
@@ -53,7 +54,8 @@ pub(super) fn load(
         remedy: "check the path given to --env",
     })?;
     let most_texels = MAX_TEXELS.min(MAX_UNBACKED_TEXELS.max(MAX_RATIO * bytes.len() as u64));
-    let Picture { width, height, pixels } = Picture::decode_light(file, &bytes, layer, most_texels)?;
+    let picture = Picture::decode_light(file, &bytes, layer, most_texels);
+    let Picture { width, height, pixels } = picture.map_err(SceneError::EnvironmentMap)?;
     let mut map = EnvironmentMap { width: width as usize, height: height as usize, texels: pixels };
     clean(file, &mut map, warnings);
     scale_texels(&mut map, scale).map_err(|what| error(file, what, "give a smaller --env-scale"))?;
@@ -80,7 +82,10 @@ fn scale_texels(map: &mut EnvironmentMap, scale: f32) -> Result<(), String> {
     map.texels.iter_mut().for_each(|texel| *texel *= scale);
     match map.texels.iter().filter(|texel| !texel.is_finite()).count() {
         0 => Ok(()),
-        beyond => Err(format!("scaled by {scale}, {beyond} texels exceed the largest 32-bit number")),
+        beyond => {
+            let beyond = format::counted(beyond as u64, "texel exceeds", "texels exceed");
+            Err(format!("scaled by {scale:?}, {beyond} the largest 32-bit number"))
+        }
     }
 }
 
@@ -98,10 +103,13 @@ fn clean(path: &Path, map: &mut EnvironmentMap, warnings: &mut Vec<String>) {
     }
     let mut faults = Vec::new();
     if negative > 0 {
-        faults.push(format!("{negative} texels have negative channels, down to {least}, which count as 0"));
+        let negative = format::counted(negative, "texel has", "texels have");
+        faults.push(format!("{negative} negative channels, down to {least:?}, which count as 0"));
     }
     if not_finite > 0 {
-        faults.push(format!("{not_finite} texels are not finite and count as black"));
+        let not_finite =
+            format::counted(not_finite, "texel is not finite and counts", "texels are not finite and count");
+        faults.push(format!("{not_finite} as black"));
     }
     if !faults.is_empty() {
         warnings.push(format!("{}: {}", path.display(), faults.join("; ")));

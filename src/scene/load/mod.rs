@@ -45,7 +45,8 @@ use self::transform::world_point;
 use super::error::SceneError;
 use super::light::LIGHT_MAX;
 use super::options::LoadOptions;
-use super::{DroppedTriangles, Environment, Material, Scene};
+use super::{DroppedTriangles, Environment, Scene};
+use crate::system::format;
 
 /// Loads a `.gltf` or `.glb` file with its buffers, its images and the sky.
 ///
@@ -90,9 +91,8 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
 
     let emitters = coplanar::settle(&mut mesh, &materials.materials);
     if emitters > 0 {
-        warnings.push(format!(
-            "{emitters} emissive triangles lie in the plane of another surface; the side that emits counts as in front"
-        ));
+        let what = format::counted(emitters as u64, "emissive triangle lies", "emissive triangles lie");
+        warnings.push(format!("{what} in the plane of another surface; the side that emits counts as in front"));
     }
 
     let origin = SceneOrigin { landmark: &landmark, centre };
@@ -101,9 +101,6 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
     let mut environment = environment::load(options, &mut inputs, &mut warnings)?;
     let light_clamped = lights.clamped + materials.light_clamped + bound_sky(&mut environment, &mut warnings);
     let lights = lights.lights;
-    if lights.is_empty() && environment.is_black() && !materials.materials.iter().any(Material::emits) {
-        warnings.push("nothing in the scene sends out light; give it a sky with --env 1,1,1".to_owned());
-    }
     Ok(Scene {
         name: path.file_stem().map_or_else(|| "scene".to_owned(), |stem| stem.to_string_lossy().into_owned()),
         origin_world: world_point(&landmark, centre),
@@ -130,6 +127,7 @@ fn bound_sky(environment: &mut Environment, warnings: &mut Vec<String>) -> u64 {
         Environment::Constant(radiance) => std::slice::from_mut(radiance),
         Environment::Map(map) => &mut map.texels,
     };
+    let is_constant = texels.len() == 1;
     let mut clamped = 0;
     for texel in texels {
         if texel.max_element() > LIGHT_MAX {
@@ -138,7 +136,11 @@ fn bound_sky(environment: &mut Environment, warnings: &mut Vec<String>) -> u64 {
         }
     }
     if clamped > 0 {
-        warnings.push(format!("{clamped} texels of the sky exceed {LIGHT_MAX:e} and are clamped to that"));
+        let what = match is_constant {
+            true => "the radiance of the sky is".to_owned(),
+            false => format::counted(clamped, "texel of the environment map is", "texels of the environment map are"),
+        };
+        warnings.push(format!("{what} brighter than {LIGHT_MAX:e} and clamped to that"));
     }
     clamped
 }
@@ -165,8 +167,8 @@ fn report_skipped(skipped: &Skipped, has_skins: bool, warnings: &mut Vec<String>
 fn report_dropped(dropped: &DroppedTriangles, warnings: &mut Vec<String>) {
     if dropped.total() > 0 {
         warnings.push(format!(
-            "{} triangles are dropped: {} not finite, {} without area",
-            dropped.total(),
+            "{} dropped: {} not finite, {} without area",
+            format::counted(dropped.total(), "triangle is", "triangles are"),
             dropped.non_finite,
             dropped.zero_area
         ));

@@ -181,6 +181,7 @@ enum Part {
     /// Raised by so many metres.
     Lamp {
         dy: f32,
+        faces_down: bool,
         double_sided: bool,
         radiance: f64,
     },
@@ -194,9 +195,10 @@ fn assembled(parts: &[Part], turn: DQuat) -> Gltf {
             Part::Ceiling { faces_down, double_sided } => {
                 (ceiling(faces_down), diffuse([0.0; 3], [0.0; 3]), double_sided)
             }
-            Part::Lamp { dy, double_sided, radiance } => {
+            Part::Lamp { dy, faces_down, double_sided, radiance } => {
                 let [corner, u, v] = LAMP.map(|p| p.map(|x| x as f32));
                 let corner = [corner[0], corner[1] + dy, corner[2]];
+                let (u, v) = if faces_down { (u, v) } else { (v, u) };
                 (quad(corner, u, v, 1), diffuse([0.0; 3], [radiance; 3]), double_sided)
             }
         };
@@ -211,12 +213,18 @@ fn assembled(parts: &[Part], turn: DQuat) -> Gltf {
 }
 
 const CEILING: Part = Part::Ceiling { faces_down: true, double_sided: false };
-const PLAIN: Part = Part::Lamp { dy: 0.0, double_sided: false, radiance: RADIANCE };
+const PLAIN: Part = lamp(0.0, true, false, RADIANCE);
+
+const fn lamp(dy: f32, faces_down: bool, double_sided: bool, radiance: f64) -> Part {
+    Part::Lamp { dy, faces_down, double_sided, radiance }
+}
 
 /// Scenes in which the lamp lights what is below it as if it were alone.
 fn cases() -> Vec<(&'static str, Vec<Part>)> {
-    let both = Part::Lamp { dy: 0.0, double_sided: true, radiance: RADIANCE };
-    let at = |dy| Part::Lamp { dy, double_sided: false, radiance: RADIANCE };
+    let both = lamp(0.0, true, true, RADIANCE);
+    let at = |dy| lamp(dy, true, false, RADIANCE);
+    // They hide only the upper side of others.
+    let brighter_above = lamp(0.0, false, false, 3.0 * RADIANCE);
     vec![
         ("single-sided", vec![PLAIN, CEILING]),
         ("a micrometre below", vec![at(-1e-6), CEILING]),
@@ -225,7 +233,14 @@ fn cases() -> Vec<(&'static str, Vec<Part>)> {
         ("double-sided ceiling", vec![PLAIN, Part::Ceiling { faces_down: true, double_sided: true }]),
         ("back plate", vec![PLAIN, Part::Ceiling { faces_down: false, double_sided: false }]),
         ("twice", vec![PLAIN, PLAIN, CEILING]),
-        ("over a dimmer one", vec![PLAIN, Part::Lamp { dy: 0.0, double_sided: false, radiance: 3.0 }]),
+        ("over a dimmer one", vec![PLAIN, lamp(0.0, true, false, 3.0)]),
+        ("over a dimmer double-sided one", vec![PLAIN, lamp(0.0, true, true, 3.0)]),
+        ("over a dimmer double-sided one, wound the other way", vec![PLAIN, lamp(0.0, false, true, 3.0)]),
+        ("double-sided below a brighter one", vec![both, brighter_above]),
+        (
+            "double-sided below a brighter one, wound the other way",
+            vec![lamp(0.0, false, true, RADIANCE), brighter_above],
+        ),
     ]
 }
 
@@ -261,7 +276,7 @@ fn a_lamp_in_the_plane_of_the_ceiling_lights_as_if_alone() {
     }
 }
 
-/// Above the ceiling a lamp that faces down is never seen, and a double-sided one is.
+/// Above the ceiling a lamp that faces down is never seen, and a double-sided one or one that faces up is.
 #[test]
 fn the_far_side_sees_what_faces_it() {
     for (name, parts) in cases() {
@@ -278,7 +293,8 @@ fn the_far_side_sees_what_faces_it() {
                 let origin = (DVec3::from(place) - scene.origin_world).as_vec3();
                 let ray = Ray::new(origin, Vec3::new(0.03, -1.0, -0.02).normalize(), 0);
                 let emits = world.surface(ray).expect("the ceiling").emission != Vec3::ZERO;
-                assert_eq!(emits, name == "double-sided lamp", "{name}, reversed {reversed}, {place:?}");
+                let faces = |part: &Part| matches!(part, Part::Lamp { faces_down, double_sided, .. } if *double_sided || !faces_down);
+                assert_eq!(emits, parts.iter().any(faces), "{name}, reversed {reversed}, {place:?}");
             }
         }
     }

@@ -164,7 +164,9 @@ fn parts_of_a_block_have_no_variance_and_no_state() {
     }
     // One block: a state, but no variance yet.
     let path = folder.path().join("one.exr");
-    reference(&scene("cornell"), &path, "--size 24x16 --spp 16");
+    let report = reference(&scene("cornell"), &path, "--size 24x16 --spp 16");
+    // The mean needs no variance.
+    assert!(report["noise"].is_null() && report["irradiance_indirect_mean"].as_f64().unwrap() > 0.0);
     let file = lightprobe::shade::reference::Reference::read(&path).unwrap();
     assert!(file.irradiance_indirect_variance().is_none());
     let report = reference(&scene("cornell"), &path, "--size 24x16 --spp 17 --resume");

@@ -63,12 +63,12 @@ impl OcclusionStore {
         }
     }
 
-    /// The visibility test of a look-up that can ask it, by its name, and how that is written.
+    /// The visibility tests of a look-up that can ask it: the name that they share, and how they are written.
     pub fn test(&self) -> (&'static str, &'static str) {
         match self {
             OcclusionStore::None => ("none", "none"),
             OcclusionStore::Moments(_) | OcclusionStore::Tiles(_) => ("chebyshev", "chebyshev(power: p, floor: f)"),
-            OcclusionStore::Surface(_) => ("table", "table()"),
+            OcclusionStore::Surface(_) => ("table", "table() or everywhere()"),
         }
     }
 

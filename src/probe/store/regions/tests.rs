@@ -144,7 +144,8 @@ fn trees_come_back_from_the_file_and_damaged_ones_do_not() {
     };
     assert_eq!(written(&|_| ()).unwrap(), regions);
     let far = (0..).find(|&i| regions.words[i] == LEAF | FAR).unwrap();
-    let changes: [(&dyn Fn(&mut Regions), &str); 10] = [
+    type Change<'a> = (&'a dyn Fn(&mut Regions), &'a str);
+    let changes: [Change; 10] = [
         (&|r| r.roots[1] = 1, ROOTS),
         (&|r| r.roots[0] = u32::MAX, ROOTS),
         (&|r| r.roots.truncate(1), ROOTS),

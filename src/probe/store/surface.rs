@@ -230,6 +230,8 @@ pub fn voxel_of_key(key: u16, n: u32) -> UVec3 {
 pub struct Facing(u8);
 
 impl Facing {
+    pub const ALL: [Facing; 6] = [Facing(0), Facing(1), Facing(2), Facing(3), Facing(4), Facing(5)];
+
     pub fn of(normal: Vec3) -> Facing {
         let axis = normal.abs().max_position();
         Facing(2 * axis as u8 + u8::from(normal[axis] < 0.0))

@@ -33,6 +33,8 @@ PERCENTS = [0.3, 0.5, 0.75, 1, 1.5, 2, 3, 4, 6]
 def brighter(scene, factor):
     """The scene with all that emits brighter."""
     path = folder / f"{scene}_{factor:.4f}.glb"
+    if path.exists():
+        return path
     data = Path(f"scenes/{scene}.glb").read_bytes()
     length = struct.unpack("<I", data[12:16])[0]
     document, rest = json.loads(data[20 : 20 + length]), data[20 + length :]
@@ -45,7 +47,10 @@ def brighter(scene, factor):
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
     head = b"glTF" + struct.pack("<III", 2, 20 + len(text) + len(rest), len(text)) + b"JSON"
-    path.write_bytes(head + text + rest)
+    # Whole from the first moment: others may be waiting for it.
+    whole = path.with_suffix(f".{threading.get_ident()}")
+    whole.write_bytes(head + text + rest)
+    whole.rename(path)
     return path
 
 

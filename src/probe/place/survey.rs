@@ -19,8 +19,8 @@ use crate::scene::{Mesh, TriangleIndex};
 use crate::trace::Ray;
 use crate::trace::offset::ray_offset;
 
-/// Memory that a survey takes at most: one [`Side`] for each side of a triangle in each voxel that it meets, twice while
-/// they are collected. A triangle meets as many voxels as its area covers, those along its edges, and one.
+/// Memory that a survey takes at most: one [`Met`] for each triangle in each voxel that it meets, twice while they are
+/// collected. A triangle meets as many voxels as its area covers, those along its edges, and one.
 pub fn estimated_bytes(mesh: &Mesh, grid: &Grid, voxels_per_cell: u32) -> u64 {
     /// A tilted plane passes through more voxels than its area has faces, √3 times as many at most.
     const TILT: f64 = 1.733;
@@ -38,7 +38,7 @@ pub fn estimated_bytes(mesh: &Mesh, grid: &Grid, voxels_per_cell: u32) -> u64 {
         (TILT * area + 2.0 * edges + 1.0).min(faces)
     };
     let total: f64 = (0..mesh.triangles.len() as u32).into_par_iter().map(voxels).sum();
-    (total * (2 * 2 * size_of::<Side>()) as f64) as u64
+    (total * (2 * size_of::<Met>()) as f64) as u64
 }
 
 /// A table with what is known beside it while baking.
@@ -50,21 +50,30 @@ pub struct Survey {
     pub rays: u64,
 }
 
-/// One side of a triangle in one voxel. Small, for there are millions and they are sorted.
+/// A triangle in one voxel. Small, for there are millions and they are sorted.
 #[derive(Debug, Clone, Copy)]
-struct Side {
+struct Met {
     cell: CellIndex,
     triangle: u32,
-    key: u16,
-    /// Whether this is the back of the triangle.
-    is_back: bool,
+    /// Of the voxel with [`Facing::ALL`]'s first facing.
+    voxel_key: u16,
+    /// Of the front.
+    facing: Facing,
 }
 
-impl Side {
-    /// By cell, key and triangle. As one number, which compares without a branch.
+impl Met {
+    /// By cell, voxel and triangle. As one number, which compares without a branch.
     fn order(&self) -> u128 {
-        u128::from(self.cell.0) << 48 | u128::from(self.key) << 32 | u128::from(self.triangle)
+        u128::from(self.cell.0) << 48 | u128::from(self.voxel_key) << 32 | u128::from(self.triangle)
     }
+}
+
+/// One side of a triangle in a voxel.
+#[derive(Debug, Clone, Copy)]
+struct Side {
+    triangle: TriangleIndex,
+    /// Whether this is the back of the triangle.
+    is_back: bool,
 }
 
 /// What points of a voxel's surfaces see.
@@ -107,20 +116,20 @@ pub struct Surveyor<'a, 's> {
     grid: &'a Grid,
     n: u32,
     pub settings: &'a SurveySettings,
-    /// By cell, key and triangle.
-    sides: Vec<Side>,
+    /// By cell, voxel and triangle.
+    met: Vec<Met>,
 }
 
 impl<'a, 's> Surveyor<'a, 's> {
     /// Sorts every surface within the grid's hull into `voxels_per_cell` voxels along each axis of a cell.
     pub fn new(world: &'a World<'s>, grid: &'a Grid, voxels_per_cell: u32, settings: &'a SurveySettings) -> Self {
-        let mut surveyor = Surveyor { world, grid, n: voxels_per_cell, settings, sides: Vec::new() };
+        let mut surveyor = Surveyor { world, grid, n: voxels_per_cell, settings, met: Vec::new() };
         // One triangle may be a whole floor: its cells are work for all threads.
         let triangles = world.scene.mesh.triangles.len() as u32;
         let cells_of = |t: u32| surveyor.cells_of(t).map(move |cell| (t, cell));
-        let met: Vec<(u32, CellIndex)> = (0..triangles).into_par_iter().flat_map_iter(cells_of).collect();
-        surveyor.sides = met.par_iter().flat_map_iter(|&(t, cell)| surveyor.sides_in(t, cell)).collect();
-        surveyor.sides.par_sort_unstable_by_key(Side::order);
+        let in_cells: Vec<(u32, CellIndex)> = (0..triangles).into_par_iter().flat_map_iter(cells_of).collect();
+        surveyor.met = in_cells.par_iter().flat_map_iter(|&(t, cell)| surveyor.met_in(t, cell)).collect();
+        surveyor.met.par_sort_unstable_by_key(Met::order);
         surveyor
     }
 
@@ -148,15 +157,15 @@ impl<'a, 's> Surveyor<'a, 's> {
         })
     }
 
-    /// Both sides of a triangle in every voxel of a cell that it meets.
-    fn sides_in(&self, triangle: u32, cell: CellIndex) -> impl Iterator<Item = Side> {
+    /// A triangle in every voxel of a cell that it meets.
+    fn met_in(&self, triangle: u32, cell: CellIndex) -> impl Iterator<Item = Met> {
         let margin = self.settings.voxel_margin;
         let scaled = self.mesh().corners(TriangleIndex(triangle)).map(|c| self.in_voxels(cell, c));
         let low = scaled[0].min(scaled[1]).min(scaled[2]) - margin;
         let high = scaled[0].max(scaled[1]).max(scaled[2]) + margin;
         let last = UVec3::splat(self.n - 1);
         let (low, high) = (low.max(Vec3::ZERO).as_uvec3().min(last), high.max(Vec3::ZERO).as_uvec3().min(last));
-        let front = Facing::of(self.mesh().geometric_normal(TriangleIndex(triangle)));
+        let facing = Facing::of(self.mesh().geometric_normal(TriangleIndex(triangle)));
         // Small triangles are wholly in one voxel.
         let within = low == high;
         let meets = move |voxel: &UVec3| {
@@ -164,9 +173,11 @@ impl<'a, 's> Surveyor<'a, 's> {
             within || triangle_meets_box(scaled.map(|c| c - centre), Vec3::splat(0.5 + margin))
         };
         let n = self.n;
-        block(low, high).filter(meets).flat_map(move |voxel| {
-            let side = |is_back, facing| Side { cell, triangle, key: key(voxel, facing, n), is_back };
-            [side(false, front), side(true, front.opposite())]
+        block(low, high).filter(meets).map(move |voxel| Met {
+            cell,
+            triangle,
+            voxel_key: key(voxel, Facing::ALL[0], n),
+            facing,
         })
     }
 
@@ -181,13 +192,13 @@ impl<'a, 's> Surveyor<'a, 's> {
         for &probe in earlier.iter().flat_map(|(_, moved)| *moved) {
             self.grid.cells_of(ProbeIndex(probe as u32)).for_each(|cell| stale[cell.0 as usize] = true);
         }
-        let groups: Vec<&[Side]> = self
-            .sides
-            .chunk_by(|a, b| (a.cell, a.key) == (b.cell, b.key))
+        let groups: Vec<&[Met]> = self
+            .met
+            .chunk_by(|a, b| (a.cell, a.voxel_key) == (b.cell, b.voxel_key))
             .filter(|group| stale[group[0].cell.0 as usize])
             .collect();
-        let look = |group: &&[Side]| Look { surveyor: self, placement, group }.look();
-        let found: Vec<Found> = groups.par_iter().map(look).collect();
+        let found: Vec<Found> =
+            groups.into_par_iter().flat_map_iter(|group| looks(self, placement, group).map(|l| l.look())).collect();
         let mut table = SurfaceVisibility { voxels_per_cell: self.n, ..Default::default() };
         let mut fronts = Vec::new();
         let mut anew = found.iter().filter(|found| found.asks).peekable();
@@ -210,20 +221,41 @@ impl<'a, 's> Surveyor<'a, 's> {
     }
 }
 
-/// A look from the surfaces of one side of a voxel.
+/// A look from the surfaces of a voxel that face one way.
 struct Look<'a, 's> {
     surveyor: &'a Surveyor<'a, 's>,
     placement: &'a Placement,
-    group: &'a [Side],
+    cell: CellIndex,
+    key: u16,
+    /// By triangle.
+    sides: Vec<Side>,
+}
+
+/// The looks from all surfaces of one voxel, by their keys.
+fn looks<'a, 's>(
+    surveyor: &'a Surveyor<'a, 's>,
+    placement: &'a Placement,
+    met: &'a [Met],
+) -> impl Iterator<Item = Look<'a, 's>> {
+    let Met { cell, voxel_key, .. } = met[0];
+    Facing::ALL.into_iter().filter_map(move |facing| {
+        let side = |m: &Met| {
+            let is_back = m.facing == facing.opposite();
+            (is_back || m.facing == facing).then_some(Side { triangle: TriangleIndex(m.triangle), is_back })
+        };
+        let sides: Vec<Side> = met.iter().filter_map(side).collect();
+        let key = key(voxel_of_key(voxel_key, surveyor.n), facing, surveyor.n);
+        (!sides.is_empty()).then_some(Look { surveyor, placement, cell, key, sides })
+    })
 }
 
 impl Look<'_, '_> {
     fn look(&self) -> Found {
         let Surveyor { grid, world, n, settings, .. } = *self.surveyor;
-        let Side { cell, key, .. } = self.group[0];
+        let (cell, key) = (self.cell, self.key);
         // Backs of surfaces that have only fronts are asked for where nothing else is.
-        let is_outside = |side: &Side| !side.is_back || world.scene.material(TriangleIndex(side.triangle)).double_sided;
-        let is_front = self.group.iter().any(is_outside);
+        let is_outside = |side: &Side| !side.is_back || world.scene.material(side.triangle).double_sided;
+        let is_front = self.sides.iter().any(is_outside);
         let mut found = Found { cell, key, mask: 0, is_front, asks: false, rays: 0 };
         let active = active_corners(grid, &self.placement.states, cell);
         if active == 0 {
@@ -231,11 +263,11 @@ impl Look<'_, '_> {
         }
         let centre = voxel_of_key(key, n).as_vec3() + 0.5;
         let piece = |side: &Side| {
-            let corners = self.surveyor.mesh().corners(TriangleIndex(side.triangle));
+            let corners = self.surveyor.mesh().corners(side.triangle);
             Piece::new(corners.map(|c| self.surveyor.in_voxels(cell, c) - centre), settings.voxel_margin)
         };
         let all = |counts: &dyn Fn(&Side) -> bool, has_area: bool| -> Vec<(&Side, Piece)> {
-            let pieces = self.group.iter().filter(|side| counts(side)).map(|side| (side, piece(side)));
+            let pieces = self.sides.iter().filter(|side| counts(side)).map(|side| (side, piece(side)));
             pieces.filter(|(_, piece)| (piece.area > 0.0) == has_area).collect()
         };
         // Outsides, backs, and what but touches the voxel: the next only where those before see no probe.
@@ -264,7 +296,7 @@ impl Look<'_, '_> {
     /// probe.
     fn tally(&self, pieces: &[(&Side, Piece)], active: u8, search: u32, tier: u64) -> Tally {
         let Surveyor { grid, world, settings, .. } = *self.surveyor;
-        let Side { cell, key, .. } = self.group[0];
+        let (cell, key) = (self.cell, self.key);
         let probes = grid.corners(cell);
         let area: f32 = pieces.iter().map(|(_, piece)| piece.area).sum();
         let SurveySettings { first_points, all_points, .. } = *settings;
@@ -282,7 +314,7 @@ impl Look<'_, '_> {
             let (true, Some([place, x, y, salt])) = (tried < enough, points.next()) else { break };
             let (side, barycentric) =
                 point(pieces, area * unit_from_bits(place), Vec2::new(unit_from_bits(x), unit_from_bits(y)));
-            let triangle = TriangleIndex(side.triangle);
+            let triangle = side.triangle;
             let corners = &self.surveyor.mesh().corners(triangle);
             let front = self.surveyor.mesh().geometric_normal(triangle);
             let position =

@@ -233,7 +233,7 @@ pub fn voxel_of_key(key: u16, n: u32) -> UVec3 {
 pub struct Facing(u8);
 
 impl Facing {
-    pub const COUNT: u8 = 6;
+    pub const ALL: [Facing; 6] = [Facing(0), Facing(1), Facing(2), Facing(3), Facing(4), Facing(5)];
 
     pub fn of(normal: Vec3) -> Facing {
         let axis = normal.abs().max_position();
@@ -242,10 +242,6 @@ impl Facing {
 
     pub fn opposite(self) -> Facing {
         Facing(self.0 ^ 1)
-    }
-
-    pub fn all() -> impl Iterator<Item = Facing> {
-        (0..Facing::COUNT).map(Facing)
     }
 
     #[inline]

@@ -93,7 +93,7 @@ impl Grower {
         // Who sees none of the eight is inside of something, or cannot be helped.
         for (place, &mask) in air_places(n).zip(air).filter(|(_, mask)| **mask != 0) {
             let voxel = voxel_of(place, n);
-            for facing in Facing::all().filter(|&facing| !surfaces[Self::place(n, voxel, facing)]) {
+            for facing in Facing::ALL.into_iter().filter(|&facing| !surfaces[Self::place(n, voxel, facing)]) {
                 self.samples.push(Sample { at: at(voxel, facing), answer: mask.into(), kind: Kind::Air, number: 0 });
             }
         }

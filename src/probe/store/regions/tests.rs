@@ -16,7 +16,7 @@ fn table(n: u32, share: f32, masks: &[u8], seed: u64) -> SurfaceVisibility {
     let mut random = Random::new(seed, Purpose::FitPoints, 0, 0);
     let mut table = SurfaceVisibility { voxels_per_cell: n, ..Default::default() };
     for v in 0..n.pow(3) {
-        for facing in Facing::all() {
+        for facing in Facing::ALL.into_iter() {
             if random.uniform() < share {
                 // The masks change from one side of the cell to the other, with exceptions.
                 let side = usize::from(2 * (v % n) >= n);
@@ -180,8 +180,7 @@ fn words_that_pass_for_trees_answer_everywhere_and_end() {
         passed += usize::from(firsts.len() < 7);
         for first in firsts {
             let regions = Regions { voxels_per_cell: 4, roots: vec![first], words: words.clone() };
-            let places = (0..64 * 6)
-                .map(|i| (UVec3::new(i % 4, i / 4 % 4, i / 16 % 4), Facing::all().nth(i as usize / 64).unwrap()));
+            let places = (0..64 * 6).map(|i| (UVec3::new(i % 4, i / 4 % 4, i / 16 % 4), Facing::ALL[i as usize / 64]));
             let seen: u32 =
                 places.map(|(v, facing)| regions.mask(regions.leaf(first as usize, v, facing)).count_ones()).sum();
             assert_eq!(regions.mean_visible(), f64::from(seen) / 384.0, "{words:?}");

@@ -50,7 +50,7 @@ impl Part {
     /// A cell.
     pub fn whole(voxels_per_cell: u32) -> Part {
         let n = voxels_per_cell as u8;
-        Part { low: [0; 4], high: [n, n, n, Facing::COUNT] }
+        Part { low: [0; 4], high: [n, n, n, Facing::ALL.len() as u8] }
     }
 
     /// Below and beyond the plane of a word; `None` where the plane does not divide the box.

@@ -268,13 +268,8 @@ impl Occlusion {
     }
 
     /// Mean number of probes that are seen, of the eight around, over all voxels and facings; `None` where that is not stored.
-    pub fn mean_visible(&self, grid: &Grid) -> Option<f64> {
-        match self {
-            Occlusion::None | Occlusion::Moments(_) | Occlusion::Tiles(_) => None,
-            // Files of both kinds are compared. Of the air this one knows nothing.
-            Occlusion::Surface(table) => Some(Regions::new(grid, table, &[]).mean_visible()),
-            Occlusion::Regions(regions) => Some(regions.mean_visible()),
-        }
+    pub fn mean_visible(&self) -> Option<f64> {
+        self.regions().map(Regions::mean_visible)
     }
 
     /// Name and size in words.

@@ -184,7 +184,7 @@ fn report_of_probes(path: &Path) -> Result<Value, DiffError> {
     let file = file::read(path)?;
     let volume = file.volume_in_grid();
     let fineness = volume.irradiance.fineness();
-    Ok(json!({
+    let mut told = json!({
         "seed": file.seed,
         "config": file.config,
         "scene_blake3": file.scene.blake3,
@@ -194,7 +194,11 @@ fn report_of_probes(path: &Path) -> Result<Value, DiffError> {
             "border": file.border,
             "resolution": fineness.resolution,
             "visibility": volume.occlusion.rank(),
-            "visible": volume.occlusion.mean_visible(&volume.grid),
         },
-    }))
+    });
+    // Tables tell of surfaces alone, trees of all places: as reports of older programs, tables do not tell the figure.
+    if volume.occlusion.surface().is_none() {
+        told["stored"]["visible"] = json!(volume.occlusion.mean_visible());
+    }
+    Ok(told)
 }

@@ -168,8 +168,8 @@ impl Shaded {
     }
 
     /// Adds the error in the air.
-    pub fn compare_in_air(&mut self, truth: &AirTruth) {
-        self.report.air.compare(&self.in_air, truth);
+    pub fn compare_in_air(&mut self, air: &Air, truth: &AirTruth) {
+        self.report.air.compare(air, &self.in_air, truth);
     }
 }
 

@@ -35,7 +35,7 @@ class Probes:
             self.meta = file.metadata()
             self.tensors = {name: file.get_tensor(name) for name in file.keys()}
         assert self.meta["format"] == "lightprobe/1", self.meta["format"]
-        self.reach_voxels, self.strip = 3, 0.25
+        self.reach_voxels, self.strip, self.sum_floor = 3, 0.25, 0.0
         if "query" in self.meta:  # older files say it in their configuration
             self.check_weights(json.loads(self.meta["query"])["weights"])
         grid = json.loads(self.meta["grid"])
@@ -54,13 +54,15 @@ class Probes:
 
     def check_weights(self, weights):
         """Refuses files that are asked in another way than this script asks."""
+        self.sum_floor = weights.get("sum_floor", 0.0)
         plain = {"direction": "uniform", "blend": "linear", "trilinear_floor": 0.0, "weight_floor": 0.0}
         plain |= {"crush_below": 0.0, "normal_bias": 0.0, "view_bias": 0.0}
         plain |= {"look_up": "normal"}
         other = [key for key, value in plain.items() if weights.get(key, value) != value]
         if weights["test"] != "none":
-            if "table" in weights["test"]:
-                table = weights["test"]["table"]
+            kind = next(iter(weights["test"]))
+            if kind == "table" or kind == "everywhere" and "visibility_tree" in self.tensors:
+                table = weights["test"][kind]
                 self.reach_voxels, self.strip = table["reach_voxels"], table["strip"]
             else:
                 other.append("test")
@@ -96,6 +98,10 @@ class Probes:
         top, bottom = self.maps[probe, y], self.maps[probe, y1]
         value = (top[x] * (1 - fx) + top[x1] * fx) * (1 - fy) + (bottom[x] * (1 - fx) + bottom[x1] * fx) * fy
         return value if self.meta["encoding.irradiance"] == "linear" else 2 * np.pi * value**5
+
+    def mean_irradiance(self, probe):
+        """W/m², over all directions, where coefficients hold it."""
+        return np.sqrt(1 / 4 / np.pi) * self.sh[probe, 0] if self.maps is None else np.zeros(3)
 
     def seen(self, g, base, fraction, normal):
         """Mask of the cell's eight probes that a surface sees, bit i for corner i, and a farther probe or None."""
@@ -165,6 +171,9 @@ class Probes:
             mask_of = lambda v: 0 if (word := int(words[part(v)])) & 1 << 13 else word & 255
             mask = self.beside(voxel, fraction, n, mask_of)
         far = mask == 0 and int(words[own]) & 1 << 14
+        # The air is never without light.
+        if mask == 0 and int(words[own]) & 1 << 13:
+            mask = 255
         return mask, number(own + 1) if far else None
 
     def beside(self, voxel, fraction, n, mask_of):
@@ -202,8 +211,9 @@ class Probes:
         fraction = np.where(self.divisions > 1, np.clip(g - base.astype(np.float32), 0, 1), 0).astype(np.float32)
         mask, far = self.seen(g, base, fraction, geometric_normal)
         if far is not None:
-            return np.maximum(self.probe_irradiance(far, normal, position_world), 0)
-        total, weights = np.zeros(3), 0.0
+            least = self.sum_floor * np.maximum(self.mean_irradiance(far), 0)
+            return np.maximum(self.probe_irradiance(far, normal, position_world), least)
+        total, mean, weights = np.zeros(3), np.zeros(3), 0.0
         for i in range(8):
             step = np.array([i & 1, i >> 1 & 1, i >> 2 & 1])
             x, y, z = np.minimum(base + step, self.divisions - 1)
@@ -211,7 +221,8 @@ class Probes:
             weight = np.where(step == 1, fraction, 1 - fraction).prod()
             if mask >> i & 1 and self.tensors["state"][probe] == 0 and weight > 0:
                 total, weights = total + weight * self.probe_irradiance(probe, normal, position_world), weights + weight
-        return np.maximum(total / weights, 0) if weights > 0 else total
+                mean = mean + weight * self.mean_irradiance(probe)
+        return np.maximum(total / weights, self.sum_floor * np.maximum(mean / weights, 0)) if weights > 0 else total
 
 
 def unit(vector):

@@ -23,8 +23,8 @@ pub struct AirFigures {
     pub leak_light: Option<f64>,
     /// Σ max(0, Ê − E) ÷ ΣÊ. `null` if ΣÊ is 0.
     pub leak_dark: Option<f64>,
-    /// Share of the points that see a probe and get E = 0. Where the probes themselves are dark, as in a sealed room,
-    /// they do so with exact visibility too. `null` without points.
+    /// Share of the points that see a probe and get E = 0; with a traced reference only where that brings light. Without one,
+    /// points count too where the scene is dark, as in a sealed room. `null` without points.
     pub black: Option<f64>,
     /// Share of the points that see none of their probes. `null` without points.
     pub unseen: Option<f64>,
@@ -68,8 +68,8 @@ pub fn measure(air: &Air, irradiance: &[Vec3], exact: &[Vec3]) -> AirFigures {
 }
 
 impl AirFigures {
-    /// Adds the error against the truth at the same points.
-    pub fn compare(&mut self, irradiance: &[Vec3], truth: &AirTruth) {
+    /// Adds the error against the truth at the same points, and counts as black only those where that brings light.
+    pub fn compare(&mut self, air: &Air, irradiance: &[Vec3], truth: &AirTruth) {
         let noise = truth.variance.clone().map(|variance| ReferenceNoise {
             variance,
             covariance: None,
@@ -91,6 +91,11 @@ impl AirFigures {
         let (mean, samples) = (mean / count, 3.0 * count);
         let rmse = squares.mean(samples).max(0.0).sqrt();
         self.error = Some(rmse / mean);
+        let is_black = |(i, e): &(usize, &Vec3)| {
+            air.masks[*i] != 0 && luminance(**e) == 0.0 && luminance(truth.irradiance[*i]) > 0.0
+        };
+        let black = irradiance.iter().enumerate().filter(is_black).count();
+        self.black = Some(black as f64 / irradiance.len() as f64);
         // The mean over the points is known far better than the squares.
         let error = || root_error(rmse, squares.variance(samples).sqrt()) / mean;
         self.standard_error.error = noise.is_some().then(error);
@@ -120,11 +125,22 @@ mod tests {
     #[test]
     fn leaks_and_black_points_have_their_shares() {
         let grey = |values: [f32; 4]| values.map(Vec3::splat);
-        let figures = measure(&air(&[1, 3, 0, 255]), &grey([3.0, 0.0, 7.0, 2.0]), &grey([2.0, 4.0, 0.0, 2.0]));
+        let irradiance = grey([3.0, 0.0, 7.0, 2.0]);
+        let mut figures = measure(&air(&[1, 3, 0, 255]), &irradiance, &grey([2.0, 4.0, 0.0, 2.0]));
         let close = |found: Option<f64>, expected: f64| assert!((found.unwrap() - expected).abs() < 1e-6, "{found:?}");
         close(figures.leak_light, 0.125);
         close(figures.leak_dark, 0.5);
         assert_eq!((figures.points, figures.black, figures.unseen), (4, Some(0.25), Some(0.25)));
+        // Where no light comes, none is missing.
+        let truth = |of_second: f32| AirTruth {
+            irradiance: grey([2.0, of_second, 0.0, 2.0]).to_vec(),
+            variance: None,
+            blocks: 1,
+        };
+        figures.compare(&air(&[1, 3, 0, 255]), &irradiance, &truth(4.0));
+        assert_eq!(figures.black, Some(0.25));
+        figures.compare(&air(&[1, 3, 0, 255]), &irradiance, &truth(0.0));
+        assert_eq!(figures.black, Some(0.0));
         assert_eq!(measure(&air(&[]), &[], &[]), AirFigures::default());
     }
 
@@ -134,9 +150,9 @@ mod tests {
         let (irradiance, truth) = (vec![Vec3::splat(2.5); 64], vec![Vec3::splat(2.0); 64]);
         let mut figures = AirFigures::default();
         let known = |variance| AirTruth { irradiance: truth.clone(), variance, blocks: 1 << 20 };
-        figures.compare(&irradiance, &known(None));
+        figures.compare(&air(&[1; 64]), &irradiance, &known(None));
         assert!((figures.error.unwrap() - 0.25).abs() < 1e-6 && figures.standard_error.error.is_none());
-        figures.compare(&irradiance, &known(Some(vec![Vec3::splat(0.09); 64])));
+        figures.compare(&air(&[1; 64]), &irradiance, &known(Some(vec![Vec3::splat(0.09); 64])));
         assert!((figures.error.unwrap() - 0.2).abs() < 1e-6, "{figures:?}");
         // s of the mean of d² is √(4d²v − 2v²)/√64 = 0.0340 with channels together, and that of the root at most
         // (0.4 − √(0.16 − 2s))/2, ÷ 2.
@@ -144,7 +160,7 @@ mod tests {
         let expected = (0.4 - (0.16 - 2.0 * s).sqrt()) / 4.0;
         assert!((figures.standard_error.error.unwrap() / expected - 1.0).abs() < 1e-4, "{figures:?} {expected}");
         let mut dark = AirFigures::default();
-        dark.compare(&[Vec3::ONE], &AirTruth { irradiance: vec![Vec3::ZERO], variance: None, blocks: 1 });
+        dark.compare(&air(&[1]), &[Vec3::ONE], &AirTruth { irradiance: vec![Vec3::ZERO], variance: None, blocks: 1 });
         assert_eq!(dark.error, None);
     }
 }

@@ -111,7 +111,7 @@ impl Setting<'_, '_> {
         let [_, mut on, mut ray] = self.scenery.shade(&query, seen, bake.bytes_per_probe, || {});
         let figures = |shaded: &mut Shaded| {
             shaded.compare(&self.comparison);
-            shaded.compare_in_air(&in_air);
+            shaded.compare_in_air(&air, &in_air);
             self.figures(shaded)
         };
         let record = TruthRecord {
@@ -149,7 +149,7 @@ impl Setting<'_, '_> {
         let mut shaded = self.scenery.shade(&query, seen, bake.bytes_per_probe, || {});
         for s in &mut shaded {
             s.compare(&self.comparison);
-            s.compare_in_air(&in_air);
+            s.compare_in_air(&air, &in_air);
         }
         shaded
     }

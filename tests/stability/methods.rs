@@ -59,7 +59,7 @@ const SOON: &str = "passes end when the last changed nothing by 0.1 %, though ma
 /// mend 0.7: the rest is the test's.
 const COARSE: &str = "near edges coarse distances reject probes behind the next wall only in part";
 
-const METHODS: [Method; 7] = [
+const METHODS: [Method; 8] = [
     Method {
         name: "default",
         words: "--set encoding.irradiance=f32 --set capture.resolution=16",
@@ -69,6 +69,17 @@ const METHODS: [Method; 7] = [
         below: 1e-3,
         stiff: [0.999, 0.99],
         walls: 0.999,
+        why: NOTHING,
+    },
+    Method {
+        name: "fitted",
+        words: "--preset fitted --set store.irradiance.sh9.format=f32",
+        iterations: "sweeps",
+        base: 1,
+        above: PATHS,
+        below: PATHS,
+        stiff: [1.0 - PATHS; 2],
+        walls: 1.0 - PATHS,
         why: NOTHING,
     },
     Method {

@@ -153,7 +153,7 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
     }
     if let Some(spp) = args.reference {
         let truth = air.truth(run.world, spp, session.seed);
-        shaded.iter_mut().chain(&mut path_traced).for_each(|shaded| shaded.compare_in_air(&truth));
+        shaded.iter_mut().chain(&mut path_traced).for_each(|shaded| shaded.compare_in_air(&air, &truth));
     }
     create_folder(folder)?;
     pictures::write(volume, (camera, &view), &shaded, reference.as_ref(), exposure_ev, folder)?;

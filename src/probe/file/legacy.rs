@@ -151,6 +151,7 @@ pub fn query(config: &str) -> Result<QueryRecord, String> {
             bias_spacing: BiasSpacing::Largest,
             distance_bias: 0.0,
             blank_below: 0.0,
+            sum_floor: 0.0,
             look_up: LookUp::Normal,
         },
         moved: old.placement.relocate,

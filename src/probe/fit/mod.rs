@@ -43,7 +43,7 @@ pub fn run(
 ) -> Option<FitFigures> {
     let Fit::Rows(settings) = fit else { return None };
     let started = Instant::now();
-    let asked = points::all(world, query, volume, settings, seed);
+    let asked = points::all(world, query, volume, settings);
     let (targets, rays, non_finite) = targets::trace(world, &asked, settings, seed, &advance);
     let before = figures::residuals(query, volume, &asked, &targets);
     let lit = targets::without_brightest(&asked, &targets);

@@ -1,4 +1,4 @@
-//! Where look-ups are asked that the probes are fitted to: the order depends on the seed alone.
+//! Where look-ups are asked that the probes are fitted to, in a fixed order.
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -61,17 +61,22 @@ const ROUNDS: usize = 4;
 /// A surface is looked at from this many of its ray offsets away, to find out whether it is seen where it is drawn.
 const NEAR: f32 = 4.0;
 
+/// How far beyond the probes' hull surfaces ask for light that the fit sees to, spacings: walls around a grid within a room.
+const BEYOND: f32 = 1.0;
+
 struct Task<'a, 's> {
     world: &'a World<'s>,
     query: Query<'a>,
     contacts: Contacts,
-    seed: u64,
+    /// Surfaces within it are fitted to.
+    hull: (Vec3, Vec3),
 }
 
-/// All points, by kind.
-pub fn all(world: &World, query: &QuerySettings, volume: &Volume, settings: &RowSettings, seed: u64) -> Vec<Asked> {
+/// All points, by kind. They do not depend on the seed, like the grid and the survey: between two bakes that differ by chance
+/// only the light differs that arrives at them.
+pub fn all(world: &World, query: &QuerySettings, volume: &Volume, settings: &RowSettings) -> Vec<Asked> {
     let contacts = Contacts::of_points(world.scene, &volume.positions);
-    let task = Task { world, query: Query { volume, settings: query }, contacts, seed };
+    let task = Task { world, query: Query { volume, settings: query }, contacts, hull: volume.grid.hull(BEYOND) };
     let [surface, bent, air] = settings.points(volume.active_count());
     let mut asked = task.on_surfaces(Kind::Surface, surface, 1.0);
     asked.extend(task.on_surfaces(Kind::Bent, bent, settings.bent));
@@ -95,7 +100,7 @@ impl Task<'_, '_> {
         if !(area > 0.0 && area.is_finite()) {
             return Vec::new();
         }
-        let mut random = Random::new(self.seed, Purpose::FitPoints, kind as u64, 0);
+        let mut random = Random::new(0, Purpose::FitPoints, kind as u64, 0);
         let mut sequence = KroneckerSequence::new(&mut random);
         let mut found: Vec<Asked> = Vec::new();
         for round in 0..ROUNDS {
@@ -110,7 +115,7 @@ impl Task<'_, '_> {
                 let is_back = sides(triangle) > 1.0 && side >> 31 == 1;
                 let barycentric = triangle_barycentric(Vec2::new(unit_from_bits(u), unit_from_bits(v)));
                 let stream = (round * count + index) as u64;
-                let mut random = Random::new(self.seed, Purpose::FitPoints, kind as u64, 1 + stream);
+                let mut random = Random::new(0, Purpose::FitPoints, kind as u64, 1 + stream);
                 self.on_surface(kind, triangle, barycentric, is_back, weight, &mut random)
             };
             found.par_extend(places.into_par_iter().enumerate().filter_map(at));
@@ -136,7 +141,9 @@ impl Task<'_, '_> {
         let hit = Hit { t: 0.0, triangle, barycentric };
         let surface = world.surface_at(hit, -outwards);
         let volume = self.query.volume;
-        if !volume.grid.is_within(surface.position) || world.scene.opacity(triangle, barycentric) <= 0.0 {
+        let (low, high) = self.hull;
+        let is_within = surface.position.cmpge(low).all() && surface.position.cmple(high).all();
+        if !is_within || world.scene.opacity(triangle, barycentric) <= 0.0 {
             return None;
         }
         // Another surface in the same plane, or one that cuts through here, may be the one that is seen.
@@ -186,7 +193,7 @@ impl Task<'_, '_> {
         let (world, volume) = (self.world, self.query.volume);
         let (low, high) = air::bounds(world, &volume.grid);
         let at = |index: usize| {
-            let mut random = Random::new(self.seed, Purpose::FitPoints, Kind::Air as u64, 1 + index as u64);
+            let mut random = Random::new(0, Purpose::FitPoints, Kind::Air as u64, 1 + index as u64);
             let share = Vec3::new(random.uniform(), random.uniform(), random.uniform());
             let position = low + (high - low) * share;
             let normal = uniform_sphere(Vec2::new(random.uniform(), random.uniform()));

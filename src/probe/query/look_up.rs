@@ -1,6 +1,6 @@
 //! The look-up itself.
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec3A};
 
 use super::corner_test::{CornerTest, Mask, MomentsTest, RegionsTest, SurfaceTest, TilesTest};
 use super::point::{CornerWeights, Part, QueryPoint, Visibility};
@@ -9,6 +9,7 @@ use crate::math::octahedral::oct_from_direction;
 use crate::probe::Volume;
 use crate::probe::lattice::grid::{Cell, ProbeIndex};
 use crate::probe::store::Irradiance;
+use crate::probe::store::sh::ShIrradiance;
 
 /// A volume and the way to ask it.
 #[derive(Clone, Copy)]
@@ -143,9 +144,22 @@ impl<'v> Query<'v> {
 
     /// Irradiance around the point's normal, W·m⁻²; zero where no probe counts.
     pub fn irradiance(&self, point: &QueryPoint, visibility: Visibility) -> Vec3 {
-        let irradiance = self.blend(&self.weights(point, visibility), point, oct_from_direction(point.normal));
+        let weights = self.weights(point, visibility);
+        let irradiance = self.blend(&weights, point, oct_from_direction(point.normal));
         // Sums of harmonics dip below 0 beside bright lights. Bounces keep that, to stay linear; no one is shown it.
-        if self.volume.irradiance.signed().is_some() { irradiance.max(Vec3::ZERO) } else { irradiance }
+        match self.volume.irradiance.harmonics() {
+            Some(sh) => irradiance.max(self.least(sh, &weights)),
+            None => irradiance,
+        }
+    }
+
+    /// The least that a point gets where sums may be negative.
+    #[inline]
+    fn least(&self, sh: &ShIrradiance, corners: &CornerWeights) -> Vec3 {
+        let floor = self.settings.sum_floor;
+        let shares = if floor > 0.0 { corners.shares() } else { None };
+        let means = shares.into_iter().flatten().map(|(i, share)| sh.unknown(corners.probes[i].0 as usize, 0) * share);
+        Vec3::from(means.sum::<Vec3A>() * floor).max(Vec3::ZERO)
     }
 
     /// Weighted mean of the probes' irradiance around the direction `oct`, the point's normal.

@@ -35,6 +35,8 @@ pub struct QuerySettings {
     pub distance_bias: f32,
     /// Where every weight is below this, there is no light.
     pub blank_below: f32,
+    /// Where probes hold coefficients, whose sum may be negative, a point gets at least this share of their mean irradiance.
+    pub sum_floor: f32,
     /// The direction that probes' irradiance is looked up around.
     pub look_up: LookUp,
 }
@@ -63,6 +65,7 @@ impl Default for QuerySettings {
             bias_spacing: BiasSpacing::Largest,
             distance_bias: 0.0,
             blank_below: 0.0,
+            sum_floor: 0.0,
             look_up: LookUp::Normal,
         }
     }
@@ -201,6 +204,7 @@ impl QuerySettings {
         unit("query.view_bias", self.view_bias);
         unit("query.distance_bias", self.distance_bias);
         unit("query.blank_below", self.blank_below);
+        unit("query.sum_floor", self.sum_floor);
         match self.direction {
             DirectionWeight::Uniform => {}
             DirectionWeight::Cosine { floor } => unit("query.direction.cosine.floor", floor),

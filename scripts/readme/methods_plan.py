@@ -12,7 +12,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 WORK = ROOT / "out" / "methods"
 SHARED = os.environ.get("SHARED", "../shared")
 
-PRESETS = ["default", "irradiance-2022", "lightfield-2022", "ddgi-2019", "threev8-uniform", "threev8-mixed"]
+PRESETS = ["default", "fitted", "irradiance-2022", "lightfield-2022", "ddgi-2019", "threev8-uniform", "threev8-mixed"]
 # More than 8 KiB a probe: ladders end at the scene's own spacing, beyond which a bake takes hours of a core.
 LARGE = {"irradiance-2022", "lightfield-2022"}
 

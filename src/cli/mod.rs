@@ -7,10 +7,11 @@ use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand};
 
+use crate::probe::lattice::grid::MAX_PROBES;
 use crate::scene::EnvironmentSource;
 
 pub use self::values::{LookAt, PictureSize};
-use self::values::{parse_exposure, parse_finite, parse_not_negative, parse_positive, parse_size};
+use self::values::{parse_exposure, parse_finite, parse_not_negative, parse_positive, parse_size, parse_target_error};
 
 /// Bakes light-field probe volumes for global illumination and measures how much they leak, err and cost.
 #[derive(Debug, Parser)]
@@ -136,6 +137,16 @@ pub struct BakeArgs {
     pub output: Option<PathBuf>,
     #[command(flatten)]
     pub config: ConfigArgs,
+    /// Choose the spacing, and rows of a fit or rays, for this relative error: RMSE of the indirect irradiance over the scene's
+    /// surfaces ÷ its mean.
+    ///
+    /// Bakes from the configuration's spacing on, at most eight times, finer or coarser, and measures each bake at points by
+    /// path tracing. Writes the smallest file that reaches E. Where none does, it writes the best, warns and says why.
+    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = parse_target_error)]
+    pub target_error: Option<f64>,
+    /// Most probes of a grid that --target-error may choose.
+    #[arg(long, value_name = "N", default_value_t = 131_072, allow_negative_numbers = true, requires = "target_error", value_parser = clap::value_parser!(u64).range(1..=MAX_PROBES))]
+    pub max_probes: u64,
     /// Also write the report to this file.
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,

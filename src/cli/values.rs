@@ -66,6 +66,12 @@ pub fn parse_positive(text: &str) -> Result<f32, String> {
     number.ok_or_else(|| format!("write a number from {:.1e} to {:.1e}", range.start(), range.end()))
 }
 
+/// Relative errors: at 1 a bake is as far off as darkness, and none comes near to the least.
+pub fn parse_target_error(text: &str) -> Result<f64, String> {
+    let number: Option<f64> = text.parse().ok().filter(|x| (1e-6..=1.0).contains(x));
+    number.ok_or_else(|| "write a share from 1e-6 to 1, such as 0.1 for 10 %".into())
+}
+
 pub fn parse_finite(text: &str) -> Result<f64, String> {
     let number: Option<f64> = text.parse().ok().filter(|x: &f64| x.is_finite());
     number.ok_or_else(|| "write a finite number".into())

@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use glam::DVec3;
 
 use super::session::{Opening, Session, list_presets, lists_presets, resolve_config};
-use super::{Console, tell, write_json};
+use super::{Console, target, tell, write_json};
 use crate::bake::{Baked, Checkpoint, Circumstances, Prepared, prepare};
 use crate::cli::BakeArgs;
 use crate::config::Config;
@@ -30,11 +30,19 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     if args.print_config {
         return console.print(&config.to_ron());
     }
+    target::check(args, &config)?;
     tell::configuration(console, &args.config);
     let session = Session::open(opening(args, &config)?, console)?;
     let (world, accel_build_s) = session.world()?;
-    let circumstances = circumstances(args, &config, &session)?;
     warn_about_bounds(&config, &session.scene, console);
+    if let Some(error) = args.target_error {
+        let (found, file_bytes) = target::run(args, error, &config, (&session, &world), accel_build_s)?;
+        let config = found.config;
+        let target = Some(found.report);
+        let report = BakeReport { target, ..report(&found.baked, &config, &session, file_bytes, None) };
+        return finish(args, &report, &config, &session);
+    }
+    let circumstances = circumstances(args, &config, &session)?;
     let prepared = prepare(&world, &config, &circumstances)?;
     tell::prepared(console, &prepared);
     if args.dry_run {
@@ -55,14 +63,19 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     // The measurement is no part of the bake.
     baked.times.total = session.elapsed_s() - raw_s;
 
-    let report = report(&baked, &config, &session, file_bytes, raw);
-    warn_about(&report, &config, console);
+    finish(args, &report(&baked, &config, &session, file_bytes, raw), &config, &session)
+}
+
+/// Says what was done.
+fn finish(args: &BakeArgs, report: &BakeReport, config: &Config, session: &Session) -> Result<()> {
+    let (Some(output), console) = (&args.output, session.console) else { return Ok(()) };
+    warn_about(report, config, console);
     tell::written(console, output);
     if let Some(path) = &args.report {
-        write_json(path, &report)?;
+        write_json(path, report)?;
         tell::written(console, path);
     }
-    session.print(&report, || summary(&report, &config, output))
+    session.print(report, || summary(report, config, output))
 }
 
 fn opening<'a>(args: &'a BakeArgs, config: &Config) -> Result<Opening<'a>> {
@@ -210,6 +223,7 @@ fn report(baked: &Baked, config: &Config, session: &Session, file_bytes: u64, ra
         spectral_radius_estimate: baked.solution.spectral_radius_estimate,
         solver: SolverReport::of(&baked.solution),
         fit: baked.fit.as_ref().map(FitFigures::report),
+        target: None,
         numerics: baked.numerics.clone(),
         plan: baked.plan.lines.clone(),
     }
@@ -217,6 +231,7 @@ fn report(baked: &Baked, config: &Config, session: &Session, file_bytes: u64, ra
 
 fn warn_about(report: &BakeReport, config: &Config, console: &Console) {
     let numerics = &report.numerics;
+    report.target.iter().for_each(|report| target::warn(report, console));
     if report.probes_active == 0 {
         console
             .warn("no probe is active: all lie inside geometry or where no surface can sample them; change the grid");
@@ -276,7 +291,8 @@ fn summary(report: &BakeReport, config: &Config, output: &Path) -> String {
             format!("{} ({} of it reached)", rate(Some(raw)), format::percent(share)),
         ]);
     }
-    format!("{}\n{}\nwrote {}", table, plan_summary(&report.plan), output.display())
+    let target = report.target.as_ref().map_or_else(String::new, |report| target::summary(report) + "\n");
+    format!("{}\n{}\n{target}wrote {}", table, plan_summary(&report.plan), output.display())
 }
 
 /// How many there are, and by how many iterations where these are combined.

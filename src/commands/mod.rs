@@ -9,6 +9,7 @@ pub mod reference;
 pub mod render;
 mod session;
 pub mod sweep;
+mod target;
 mod tell;
 
 use std::io::Write;

@@ -112,6 +112,13 @@ impl Config {
         ron_options().to_string_pretty(self, pretty).unwrap_or_default()
     }
 
+    /// The same with so many times as many samples of what gives the probes their light: rows of a fit where there is one,
+    /// else rays.
+    pub fn with_samples(&self, times: u32) -> Config {
+        let capture = if self.fit.is_none() { self.capture.with_samples(times) } else { self.capture.clone() };
+        Config { fit: self.fit.with_samples(times), capture, ..self.clone() }
+    }
+
     /// What a probe file says about asking its probes.
     pub fn query_record(&self) -> QueryRecord {
         QueryRecord {

@@ -19,6 +19,7 @@ pub mod places;
 pub mod punctual;
 mod roulette;
 pub mod sampled;
+pub mod sides;
 pub mod surface;
 
 use crate::scene::{Material, Scene};

@@ -42,6 +42,10 @@ pub enum Purpose {
     FitPoints = 20,
     /// Paths from these points.
     FitPaths = 21,
+    /// Points on surfaces at which bakes are judged that look for an error.
+    HeldOutPoints = 22,
+    /// Paths from these points.
+    HeldOutPaths = 23,
 }
 
 /// A source of numbers for random decisions: a [`Random`] stream, or a point of an evenly distributed set

@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::header::Header;
+use super::target::TargetReport;
 use crate::bake::figures::{Numerics, Rays, Times};
 use crate::plan::Line;
 use crate::probe::transport::solver::{Bounce, Solution, Stopped};
@@ -35,6 +36,9 @@ pub struct BakeReport {
     /// See [`FitFigures`](crate::probe::fit::FitFigures); absent without a fit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fit: Option<Value>,
+    /// Absent where no error was to be reached.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target: Option<TargetReport>,
     pub numerics: Numerics,
     pub plan: Vec<Line>,
 }

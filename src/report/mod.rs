@@ -21,5 +21,6 @@ pub mod render;
 pub mod sheet;
 pub mod sweep;
 pub mod table;
+pub mod target;
 pub mod ticks;
 pub mod words;

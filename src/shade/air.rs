@@ -7,14 +7,14 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::block_mean::BlockMean;
 use super::visibility_modes::VisibilityMode;
 use crate::light::World;
 use crate::light::contact::Contacts;
 use crate::light::path::PathSettings;
-use crate::light::sampled::RayCount;
 use crate::light::surface::SurfacePoint;
 use crate::math::blocks::{BLOCK, Block};
 use crate::math::random::{Purpose, Random};
@@ -78,21 +78,12 @@ impl Air {
         let blocks = spp.div_ceil(BLOCK).clamp(1, MOST_BLOCKS);
         let at = |(index, point): (usize, &QueryPoint)| {
             let surface = SurfacePoint::in_space(point.position, point.normal);
-            let (mut mean, mut scatter) = (DVec3::ZERO, DVec3::ZERO);
+            let mut light = BlockMean::default();
             for b in 0..blocks {
                 let block = Block::new(seed, Purpose::AirPaths, index as u64, u64::from(b));
-                let path = |i| {
-                    let (settings, mut rays) = (PathSettings::default(), RayCount::default());
-                    let mut numbers = block.sample(i);
-                    world.gather(&surface, point.normal, point.view, &settings, &mut numbers, &mut rays).irradiance
-                };
-                let finite = |e: &Vec3| e.is_finite();
-                let sum: DVec3 = (0..BLOCK).map(path).filter(finite).map(|e| e.as_dvec3()).sum();
-                let delta = sum / f64::from(BLOCK) - mean;
-                mean += delta / f64::from(b + 1);
-                scatter += delta * (sum / f64::from(BLOCK) - mean);
+                light.add(world, (&surface, point), &PathSettings::default(), &block);
             }
-            (mean.as_vec3(), (scatter / f64::from((blocks * (blocks - 1)).max(1))).as_vec3())
+            (light.mean.as_vec3(), light.variance().as_vec3())
         };
         let (irradiance, variance) = self.points.par_iter().enumerate().map(at).unzip();
         AirTruth { irradiance, variance: (blocks > 1).then_some(variance), blocks }

@@ -1,9 +1,11 @@
 //! From cameras to pictures: which points a camera sees, how probes or paths light them, and the layers of the result.
 
 pub mod air;
+pub mod block_mean;
 mod develop;
 pub mod film;
 pub mod framing;
+pub mod held_out;
 pub mod layers;
 
 pub mod outlook;

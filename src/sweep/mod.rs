@@ -2,7 +2,7 @@
 //!
 //! [`method`] and [`ladder`] say which configurations there are, [`offsets`] shifts their grids, [`run`] bakes and evaluates one of them, [`store`] keeps what is finished,
 //! [`split`] tells noise from bias, [`front`] finds what nothing beats, [`floor`] what limits the best, [`equal`] compares methods at
-//! equal cost.
+//! equal cost. [`target`] is another series: bakes until an error is reached.
 
 pub mod equal;
 pub mod floor;
@@ -13,6 +13,7 @@ pub mod offsets;
 pub mod run;
 pub mod split;
 pub mod store;
+pub mod target;
 
 use std::path::PathBuf;
 

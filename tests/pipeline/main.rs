@@ -25,4 +25,5 @@ mod reference;
 mod reports;
 mod shapes;
 mod skies;
+mod target;
 mod threev8;

@@ -82,10 +82,22 @@ impl Default for CaptureSettings {
     }
 }
 
+/// Most emitter samples of a probe.
+const MOST_PROBE_SAMPLES: u32 = 1 << 20;
+
 impl CaptureSettings {
     /// Whether surfaces find emission through the probes, and not by samples of their own.
     pub fn gathers_emission(&self) -> bool {
         self.emission == EmissionTransport::Gathered
+    }
+
+    /// The same with so many times as many rays and emitter samples of every probe.
+    pub fn with_samples(&self, times: u32) -> CaptureSettings {
+        CaptureSettings {
+            rays: self.rays.multiplied(times as usize),
+            probe_emitter_samples: self.probe_emitter_samples.saturating_mul(times).min(MOST_PROBE_SAMPLES),
+            ..self.clone()
+        }
     }
 
     /// Calls `rule(key, value, holds, rule)` for every number in it.
@@ -94,7 +106,7 @@ impl CaptureSettings {
         let emitter = self.emitter_samples;
         rule("capture.emitter_samples", emitter.to_string(), (1..=65_536).contains(&emitter), "use 1 to 65536");
         let probe = self.probe_emitter_samples;
-        rule("capture.probe_emitter_samples", probe.to_string(), probe <= 1 << 20, "use 0 to 1048576");
+        rule("capture.probe_emitter_samples", probe.to_string(), probe <= MOST_PROBE_SAMPLES, "use 0 to 1048576");
         self.backs.check(rule);
     }
 }

@@ -220,13 +220,29 @@ impl Rays {
         }
     }
 
+    /// So many times as many rays through the same texels, where rays have texels; at most as many as there may be.
+    pub fn multiplied(&self, times: usize) -> Rays {
+        match self {
+            Rays::Octahedral(rays) => Rays::Octahedral(OctahedralRays {
+                per_texel: (rays.per_texel.max(1) * times).min(MOST_PER_TEXEL),
+                guided: (rays.guided * times as f32).min(MOST_GUIDED),
+                ..rays.clone()
+            }),
+            Rays::Fibonacci(rays) => Rays::Fibonacci(FibonacciRays { count: (times * rays.count).min(MOST_FIBONACCI) }),
+            Rays::Cube(rays) => {
+                let face = (rays.face as f64 * (times as f64).sqrt()).ceil() as usize;
+                Rays::Cube(CubeRays { face: face.min(MOST_FACE), ..rays.clone() })
+            }
+        }
+    }
+
     /// Calls `rule(key, value, holds, rule)` for every number in it.
     pub fn check(&self, most_texels: usize, rule: &mut dyn FnMut(&'static str, String, bool, &'static str)) {
         let texels = "use 1 to 1024 texels";
         match self {
             Rays::Octahedral(OctahedralRays { resolution: n, per_texel, guided }) => {
                 rule(self.size_key(), n.to_string(), (1..=most_texels).contains(n), texels);
-                let holds = (1..=65_536).contains(per_texel);
+                let holds = (1..=MOST_PER_TEXEL).contains(per_texel);
                 rule("capture.rays.octahedral.per_texel", per_texel.to_string(), holds, "use 1 to 65536");
                 let holds = (0.0..=MOST_GUIDED).contains(guided);
                 rule("capture.rays.octahedral.guided", guided.to_string(), holds, "use 0 to 64");
@@ -247,6 +263,10 @@ impl Rays {
     }
 }
 
+/// Most even rays per texel.
+const MOST_PER_TEXEL: usize = 65_536;
+/// Most texels per side of a cube's face.
+const MOST_FACE: usize = 1024;
 /// Most guided rays per texel in the mean.
 const MOST_GUIDED: f32 = 64.0;
 /// Most lone rays of a probe.

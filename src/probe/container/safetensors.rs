@@ -87,6 +87,27 @@ impl Container {
 
     /// Writes the file; readers see the old one or the whole new one.
     pub fn write(&self, path: &Path) -> Result<u64, FileError> {
+        let header = self.header_text();
+        write_atomically(path, |file| {
+            file.write_all(&(header.len() as u64).to_le_bytes())?;
+            file.write_all(header.as_bytes())?;
+            self.in_file_order().into_iter().try_for_each(|(_, tensor)| file.write_all(&tensor.bytes))
+        })?;
+        Ok(self.bytes_with(&header))
+    }
+
+    /// Size of the file that [`Self::write`] makes.
+    pub fn file_bytes(&self) -> u64 {
+        self.bytes_with(&self.header_text())
+    }
+
+    fn bytes_with(&self, header: &str) -> u64 {
+        let data: usize = self.tensors.values().map(|t| t.bytes.len()).sum();
+        (8 + header.len() + data) as u64
+    }
+
+    /// The header with all hashes.
+    fn header_text(&self) -> String {
         let mut header = self.header();
         let mut hashes: BTreeMap<String, String> =
             self.tensors.iter().map(|(name, t)| (name.clone(), hash(&t.bytes))).collect();
@@ -96,13 +117,7 @@ impl Container {
         }
         let mut header = Value::Object(header).to_string();
         header.extend(std::iter::repeat_n(' ', header.len().next_multiple_of(8) - header.len()));
-        write_atomically(path, |file| {
-            file.write_all(&(header.len() as u64).to_le_bytes())?;
-            file.write_all(header.as_bytes())?;
-            self.in_file_order().into_iter().try_for_each(|(_, tensor)| file.write_all(&tensor.bytes))
-        })?;
-        let data: usize = self.tensors.values().map(|t| t.bytes.len()).sum();
-        Ok((8 + header.len() + data) as u64)
+        header
     }
 
     /// Reads a file and checks every hash. Allocates about twice the file's size, whatever its header says.

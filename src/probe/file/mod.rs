@@ -137,6 +137,15 @@ pub fn read(path: &Path) -> Result<ProbeFile, FileError> {
     decode(&container, file_bytes).map_err(damaged)
 }
 
+/// What [`read`] would give of a file of this content, `path`, that is not written yet.
+///
+/// # Errors
+/// The content is none that [`read`] takes.
+pub fn as_read(container: &Container, path: &Path) -> Result<ProbeFile, FileError> {
+    let damaged = |what| FileError::Damaged { path: path.to_owned(), what };
+    decode(container, container.file_bytes()).map_err(damaged)
+}
+
 fn decode(container: &Container, file_bytes: u64) -> Result<ProbeFile, String> {
     let record: GridRecord = container.json("grid")?;
     let spacing = Vec3::from(record.spacing);

@@ -6,15 +6,15 @@ use rayon::prelude::*;
 use super::settings::RowSettings;
 use crate::light::World;
 use crate::light::contact::{Contacts, Facet, sight_line};
+use crate::light::sides::{Place, Sides};
 use crate::light::surface::SurfacePoint;
-use crate::math::random::{KroneckerSequence, Purpose, Random, unit_from_bits};
-use crate::math::sampling::{cosine_hemisphere, triangle_barycentric, uniform_sphere};
+use crate::math::random::{KroneckerSequence, Purpose, Random};
+use crate::math::sampling::{cosine_hemisphere, uniform_sphere};
 use crate::probe::Volume;
 use crate::probe::place::air;
 use crate::probe::query::{CornerWeights, Query, QueryPoint, QuerySettings, Visibility};
 use crate::probe::store::surface::Facing;
-use crate::scene::TriangleIndex;
-use crate::trace::{Hit, Ray};
+use crate::trace::Ray;
 
 /// Which of three kinds a point is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,9 +58,6 @@ const BEND: f32 = 0.6;
 /// Rounds in which points are looked for. Surfaces far beyond the grid may use up all points of one.
 const ROUNDS: usize = 4;
 
-/// A surface is looked at from this many of its ray offsets away, to find out whether it is seen where it is drawn.
-const NEAR: f32 = 4.0;
-
 /// How far beyond the probes' hull surfaces ask for light that the fit sees to, spacings: walls around a grid within a room.
 const BEYOND: f32 = 1.0;
 
@@ -87,19 +84,7 @@ pub fn all(world: &World, query: &QuerySettings, volume: &Volume, settings: &Row
 impl Task<'_, '_> {
     /// Points uniform by area on the sides of triangles that the scene shades: both of double-sided ones.
     fn on_surfaces(&self, kind: Kind, count: usize, weight: f32) -> Vec<Asked> {
-        let triangles = || (0..self.world.scene.mesh.triangles.len() as u32).map(TriangleIndex);
-        let sides = |t| if self.world.scene.material(t).double_sided { 2.0 } else { 1.0 };
-        // Up to each triangle and with it.
-        let mut area = 0.0;
-        let areas: Vec<f64> = triangles()
-            .map(|t| {
-                area += sides(t) * f64::from(self.world.scene.mesh.area(t));
-                area
-            })
-            .collect();
-        if !(area > 0.0 && area.is_finite()) {
-            return Vec::new();
-        }
+        let Some(sides) = Sides::of(self.world.scene) else { return Vec::new() };
         let mut random = Random::new(0, Purpose::FitPoints, kind as u64, 0);
         let mut sequence = KroneckerSequence::new(&mut random);
         let mut found: Vec<Asked> = Vec::new();
@@ -108,15 +93,10 @@ impl Task<'_, '_> {
                 break;
             }
             let places: Vec<[u32; 4]> = sequence.by_ref().take(count).collect();
-            let at = |(index, [along, u, v, side]): (usize, [u32; 4])| {
-                let wanted = f64::from(along) * (area / 2f64.powi(32));
-                let triangle = areas.partition_point(|&upto| upto <= wanted).min(areas.len() - 1);
-                let triangle = TriangleIndex(triangle as u32);
-                let is_back = sides(triangle) > 1.0 && side >> 31 == 1;
-                let barycentric = triangle_barycentric(Vec2::new(unit_from_bits(u), unit_from_bits(v)));
+            let at = |(index, numbers): (usize, [u32; 4])| {
                 let stream = (round * count + index) as u64;
                 let mut random = Random::new(0, Purpose::FitPoints, kind as u64, 1 + stream);
-                self.on_surface(kind, triangle, barycentric, is_back, weight, &mut random)
+                self.on_surface(kind, &sides.place(numbers), weight, &mut random)
             };
             found.par_extend(places.into_par_iter().enumerate().filter_map(at));
         }
@@ -125,31 +105,14 @@ impl Task<'_, '_> {
         found
     }
 
-    /// A point of a triangle's side; `None` where nothing is shaded, or no probe is in sight.
-    fn on_surface(
-        &self,
-        kind: Kind,
-        triangle: TriangleIndex,
-        barycentric: Vec2,
-        is_back: bool,
-        weight: f32,
-        random: &mut Random,
-    ) -> Option<Asked> {
+    /// The point of a place; `None` where nothing is shaded, or no probe is in sight.
+    fn on_surface(&self, kind: Kind, place: &Place, weight: f32, random: &mut Random) -> Option<Asked> {
         let world = self.world;
-        let front = world.scene.mesh.geometric_normal(triangle);
-        let outwards = if is_back { -front } else { front };
-        let hit = Hit { t: 0.0, triangle, barycentric };
-        let surface = world.surface_at(hit, -outwards);
+        let surface = world.point_at(place);
         let volume = self.query.volume;
         let (low, high) = self.hull;
         let is_within = surface.position.cmpge(low).all() && surface.position.cmple(high).all();
-        if !is_within || world.scene.opacity(triangle, barycentric) <= 0.0 {
-            return None;
-        }
-        // Another surface in the same plane, or one that cuts through here, may be the one that is seen.
-        let near = surface.position + outwards * (NEAR * surface.ray_offset);
-        let seen = world.tracer.closest(Ray::new(near, -outwards, random.bits()))?;
-        if seen.triangle != triangle {
+        if !is_within || !world.is_seen(place, &surface, || random.bits()) {
             return None;
         }
         let normal = match kind {

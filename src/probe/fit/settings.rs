@@ -34,6 +34,9 @@ pub struct RowSettings {
     pub iterations: u32,
 }
 
+/// Most rows of a probe, paths of a row and iterations.
+const MOST_ROWS: u32 = 65_536;
+
 impl Default for RowSettings {
     fn default() -> Self {
         RowSettings { rows_per_probe: 100, paths: 16, bent: 0.5, air: 0.3, lambda: 0.03, iterations: 40 }
@@ -56,7 +59,7 @@ impl RowSettings {
             ("fit.rows.paths", self.paths),
             ("fit.rows.iterations", self.iterations),
         ] {
-            rule(key, value.to_string(), (1..=65_536).contains(&value), count);
+            rule(key, value.to_string(), (1..=MOST_ROWS).contains(&value), count);
         }
         for (key, value) in [("fit.rows.bent", self.bent), ("fit.rows.air", self.air)] {
             rule(key, value.to_string(), (0.0..=1e3).contains(&value), "use a number from 0 to 1000");
@@ -69,6 +72,17 @@ impl RowSettings {
 impl Fit {
     pub fn is_none(&self) -> bool {
         *self == Fit::None
+    }
+
+    /// The same from so many times as many rows, or, where these are as many as there may be, nearly so many.
+    pub fn with_samples(&self, times: u32) -> Fit {
+        match self {
+            Fit::None => Fit::None,
+            Fit::Rows(settings) => {
+                let rows_per_probe = settings.rows_per_probe.saturating_mul(times).min(MOST_ROWS);
+                Fit::Rows(RowSettings { rows_per_probe, ..settings.clone() })
+            }
+        }
     }
 
     /// Why these look-ups cannot be fitted, with the remedy; `None` where they can. Least squares need sums: means of roots

@@ -71,6 +71,14 @@ pub(super) struct Layout {
 }
 
 impl GridSettings {
+    /// Largest distance of neighbours, metres, that these settings make of a scene.
+    ///
+    /// # Errors
+    /// They make no grid.
+    pub fn spacing_in(&self, scene: &Scene) -> Result<f64, GridError> {
+        Ok(self.layout(scene, 1)?.spacing.max_element())
+    }
+
     /// The points that these settings ask for, `whole` or a multiple of it along each axis.
     pub(super) fn layout(&self, scene: &Scene, whole: u32) -> Result<Layout, GridError> {
         if self.spacing_m.is_some() && self.divisions.is_some() {

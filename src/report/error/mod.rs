@@ -29,6 +29,7 @@
 
 pub mod flip;
 pub mod pooled;
+pub mod sampled;
 pub mod terms;
 mod window;
 

@@ -1,0 +1,173 @@
+//! Points on a scene's surfaces at which bakes are judged: uniform by area, none of them of any bake or fit, with the light
+//! there by paths.
+//!
+//! They depend on the scene, the box and the seed alone, so that all bakes of a scene are judged at the same. Left out are
+//! sides that nobody is to see:
+//!
+//! * inside of solids: where more than half of what rays meet are backs of single-sided surfaces, the rule of the
+//!   placement;
+//! * before a void: where all rays leave a scene that has no sky, as from the outer faces of a closed room;
+//! * away from the box that probes were asked for: farther than [`REACH`], or not in sight of it.
+
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::block_mean::BlockMean;
+use crate::light::World;
+use crate::light::path::PathSettings;
+use crate::light::sides::{Place, Sides};
+use crate::light::surface::SurfacePoint;
+use crate::math::blocks::{BLOCK, Block};
+use crate::math::color::luminance;
+use crate::math::random::{KroneckerSequence, Purpose, Random};
+use crate::math::sampling::cosine_hemisphere;
+use crate::probe::query::QueryPoint;
+use crate::probe::store::surface::Facing;
+use crate::trace::Ray;
+
+/// Points that are looked for.
+const POINTS: usize = 16_384;
+
+/// Rounds in which they are looked for: sides that are left out may use up all points of one.
+const ROUNDS: usize = 4;
+
+/// Rays by which a point looks around.
+const LOOKS: usize = 16;
+
+/// Surfaces so near to the box that probes were asked for are judged, in sides of the box (its longest): a cell of the
+/// default grid.
+const REACH: f32 = 1.0 / 16.0;
+
+/// Rounding of the box, in the same sides.
+const ROUNDING: f32 = 1e-4;
+
+/// Blocks of paths from each point at first, and at most. Two tell the noise.
+const FIRST_BLOCKS: u32 = 2;
+const MOST_BLOCKS: u32 = 16;
+
+/// Standard error that the noise of the paths may leave, as a share of the error that is asked for.
+const NOISE_SHARE: f64 = 0.05;
+
+/// Points with the light there.
+pub struct HeldOut {
+    pub points: Vec<(SurfacePoint, QueryPoint)>,
+    pub truth: Vec<BlockMean>,
+}
+
+impl HeldOut {
+    /// Looks for points and traces the light there, so well that `error`, relative, can be told. `bounds`: the box that
+    /// probes were asked for, relative to the scene's origin; `None`: the whole scene.
+    pub fn new(world: &World, bounds: Option<(Vec3, Vec3)>, error: f64, seed: u64) -> HeldOut {
+        let points = points(world, bounds, seed);
+        let keys = points.iter().map(|(surface, _)| world.places.key_of(surface)).collect();
+        let expected = world.expect(keys);
+        let path = PathSettings { expected: Some(&expected), ..PathSettings::default() };
+        let mut truth = vec![BlockMean::default(); points.len()];
+        let mut blocks = FIRST_BLOCKS;
+        loop {
+            truth.par_iter_mut().zip(&points).enumerate().for_each(|(index, (light, (surface, query)))| {
+                for b in light.blocks..blocks {
+                    let block = Block::new(seed, Purpose::HeldOutPaths, index as u64, u64::from(b));
+                    light.add(world, (surface, query), &path, &block);
+                }
+            });
+            if blocks >= MOST_BLOCKS || noise(&truth, error) <= NOISE_SHARE * error {
+                return HeldOut { points, truth };
+            }
+            blocks *= 2;
+        }
+    }
+
+    /// Paths from each point.
+    pub fn paths(&self) -> u32 {
+        self.truth.first().map_or(0, |light| light.blocks * BLOCK)
+    }
+
+    /// Whether any light arrives.
+    pub fn is_lit(&self) -> bool {
+        self.truth.iter().any(|light| light.mean.max_element() > 0.0)
+    }
+}
+
+/// The standard error that the truth's noise gives a relative error of this size: var(d² − v) = 4D²v + 2v² for a difference D
+/// and noise of variance v, with the channels of a point taken as one. The square of a variance that was estimated from k
+/// blocks is (k + 1)/(k − 1) times too large.
+fn noise(truth: &[BlockMean], error: f64) -> f64 {
+    let count = truth.len().max(1) as f64;
+    let mean = truth.iter().map(|light| f64::from(luminance(light.mean.as_vec3()))).sum::<f64>() / count;
+    if mean <= 0.0 {
+        return 0.0;
+    }
+    let of_point = |light: &BlockMean| {
+        let (v, k) = (light.variance().element_sum() / 3.0, f64::from(light.blocks));
+        4.0 * (error * mean).powi(2) * v + 2.0 * v * v * (k - 1.0) / (k + 1.0)
+    };
+    let of_square = truth.iter().map(of_point).sum::<f64>().sqrt() / count;
+    of_square / (2.0 * error * mean * mean)
+}
+
+fn points(world: &World, bounds: Option<(Vec3, Vec3)>, seed: u64) -> Vec<(SurfacePoint, QueryPoint)> {
+    let Some(sides) = Sides::of(world.scene) else { return Vec::new() };
+    let mut random = Random::new(seed, Purpose::HeldOutPoints, 0, 0);
+    let mut sequence = KroneckerSequence::new(&mut random);
+    let mut found = Vec::new();
+    for round in 0..ROUNDS {
+        if found.len() >= POINTS {
+            break;
+        }
+        let places: Vec<[u32; 4]> = sequence.by_ref().take(POINTS).collect();
+        let at = |(index, numbers): (usize, [u32; 4])| {
+            let mut random = Random::new(seed, Purpose::HeldOutPoints, 1, (round * POINTS + index) as u64);
+            point(world, bounds, &sides.place(numbers), &mut random)
+        };
+        found.par_extend(places.into_par_iter().enumerate().filter_map(at));
+    }
+    found.truncate(POINTS);
+    found
+}
+
+/// The point of a place, which asks with its shading normal; `None` where it is left out.
+fn point(
+    world: &World,
+    bounds: Option<(Vec3, Vec3)>,
+    place: &Place,
+    random: &mut Random,
+) -> Option<(SurfacePoint, QueryPoint)> {
+    let surface = world.point_at(place);
+    if !bounds.is_none_or(|bounds| is_asked_for(world, bounds, &surface, random)) {
+        return None;
+    }
+    if !world.is_seen(place, &surface, || random.bits()) || !looks_at_something(world, &surface, random) {
+        return None;
+    }
+    let geometric = surface.geometric_normal;
+    let view = cosine_hemisphere(geometric, Vec2::new(random.uniform(), random.uniform()));
+    let (position, normal, facing) = (surface.position, surface.shading_normal, Facing::of(geometric));
+    Some((surface, QueryPoint { position, normal, geometric, facing, view }))
+}
+
+/// Whether a point lies in the box, or beside it and sees it.
+fn is_asked_for(world: &World, (low, high): (Vec3, Vec3), surface: &SurfacePoint, random: &mut Random) -> bool {
+    let longest = (high - low).max_element();
+    let nearest = surface.position.clamp(low, high);
+    let away = surface.position.distance(nearest);
+    if away <= ROUNDING * longest {
+        return true;
+    }
+    let (from, salt) = (surface.ray_origin(), random.bits());
+    let faces = (nearest - surface.position).dot(surface.geometric_normal) > 0.0;
+    away <= REACH * longest && faces && !world.tracer.occluded(Ray::segment(from, nearest, salt))
+}
+
+/// Whether a side looks neither at the inside of a solid nor into a void.
+fn looks_at_something(world: &World, surface: &SurfacePoint, random: &mut Random) -> bool {
+    let (mut hits, mut backs) = (0, 0);
+    for _ in 0..LOOKS {
+        let direction = cosine_hemisphere(surface.geometric_normal, Vec2::new(random.uniform(), random.uniform()));
+        if let Some(seen) = world.surface(Ray::new(surface.ray_origin(), direction, random.bits())) {
+            hits += 1;
+            backs += usize::from(seen.is_back());
+        }
+    }
+    2 * backs <= hits && (hits > 0 || world.emitters.has_sky())
+}

@@ -1,0 +1,6 @@
+//! The coarsest grid whose error is no larger than was asked for: bake, measure, predict, bake again.
+//!
+//! [`rule`] chooses the next bake from those that were measured, [`search`] makes them.
+
+pub mod rule;
+pub mod search;

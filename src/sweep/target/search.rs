@@ -1,0 +1,280 @@
+//! The bakes of a search, each judged at the same points.
+
+use std::path::Path;
+use std::time::Instant;
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::rule::{self, Choice, Next, Step};
+use crate::bake::{BakeError, Baked, Circumstances, Prepared, prepare};
+use crate::config::Config;
+use crate::light::World;
+use crate::probe::Grid;
+use crate::probe::file::{self, SceneRecord};
+use crate::probe::query::{Query, Visibility};
+use crate::report::error::sampled;
+use crate::report::target::{NextReport, NoiseReport, StepReport, StoppedBecause, TargetReport};
+use crate::shade::held_out::HeldOut;
+use crate::system::format;
+
+/// What a search works on.
+pub struct Search<'a, 's> {
+    pub world: &'a World<'s>,
+    /// Its spacing, or that of the default grid, is the first.
+    pub config: &'a Config,
+    pub circumstances: &'a Circumstances,
+    pub scene: &'a SceneRecord,
+    /// The file that is to be written, for messages.
+    pub output: &'a Path,
+    /// Relative error that is asked for.
+    pub error: f64,
+    pub most_probes: u64,
+}
+
+/// The bake that is kept.
+pub struct Found {
+    pub config: Config,
+    pub baked: Baked,
+    pub report: TargetReport,
+}
+
+/// Why there is no bake.
+#[derive(Debug, thiserror::Error)]
+pub enum SearchError {
+    #[error(transparent)]
+    Bake(#[from] BakeError),
+    #[error(
+        "--max-probes {most}: the grid with the largest cells has {least} probes; raise it, or lower placement.refine.mixed.levels"
+    )]
+    TooFew { most: u64, least: u64 },
+}
+
+/// A bake that was judged.
+struct Judged {
+    config: Config,
+    baked: Baked,
+    /// Irradiance at the points.
+    found: Vec<Vec3>,
+    report: StepReport,
+}
+
+/// Why there is no further step, with what the user can do.
+struct Stop {
+    because: StoppedBecause,
+    message: String,
+}
+
+impl Search<'_, '_> {
+    /// Bakes until the error is reached, or something ends the search. `prepared` and `step` are told of every bake.
+    ///
+    /// # Errors
+    /// The first bake fails; or a later one for another reason than too little memory.
+    pub fn run(&self, prepared: impl Fn(&Prepared), step: impl Fn(&StepReport)) -> Result<Found, SearchError> {
+        let started = Instant::now();
+        let scene = self.world.scene;
+        let bounds = self.config.grid.bounds.map(|bounds| {
+            let relative = |corner: (f64, f64, f64)| (DVec3::from(corner) - scene.origin_world).as_vec3();
+            (relative(bounds.min), relative(bounds.max))
+        });
+        let held_out = HeldOut::new(self.world, bounds, self.error, self.circumstances.seed);
+        let first = self.first()?;
+        let mut kept = self.judge(first, self.circumstances, &held_out, &prepared)?;
+        step(&kept.report);
+        let mut reports = vec![kept.report.clone()];
+        let mut steps: Vec<Step> = Vec::new();
+        let mut noise = None;
+        let stop = loop {
+            let Some(latest) = reports.last().and_then(measured) else { break nothing_to_judge_by(&held_out) };
+            steps.push(latest);
+            let choice = match rule::next(&steps, self.error, noise.map(|n: NoiseReport| n.error)) {
+                Next::Bake(choice) => choice,
+                Next::Reached => break Stop::of(StoppedBecause::Reached, "it is reached"),
+                Next::NotFalling => {
+                    let what = "the error does not fall any more with finer grids and more samples";
+                    break Stop::of(StoppedBecause::NotFalling, what);
+                }
+                Next::Steps => break Stop::of(StoppedBecause::Steps, "that many bakes are the most"),
+            };
+            let is_finer = steps.iter().all(|s| choice.spacing_m <= s.spacing_m);
+            let choice = if is_finer && noise.is_none() && steps.len() == 1 {
+                noise = Some(self.noise(&kept, &held_out)?);
+                match rule::next(&steps, self.error, noise.map(|n| n.error)) {
+                    Next::Bake(choice) => choice,
+                    _ => choice,
+                }
+            } else {
+                choice
+            };
+            let choice = match self.within_limit(choice, &steps) {
+                Ok(choice) => choice,
+                Err(stop) => break stop,
+            };
+            let judged = match self.judge(choice, self.circumstances, &held_out, &prepared) {
+                Err(BakeError::Memory(error)) => break Stop::of(StoppedBecause::Memory, &error.to_string()),
+                judged => judged?,
+            };
+            step(&judged.report);
+            reports.push(judged.report.clone());
+            let with_it: Vec<Step> = reports.iter().filter_map(measured).collect();
+            if rule::best(&with_it, self.error) == Some(with_it.len() - 1) {
+                kept = judged;
+            }
+        };
+        let next = self.next(&steps, &kept, noise);
+        let (error, standard_error) = (kept.report.error, kept.report.standard_error);
+        let report = TargetReport {
+            error: self.error,
+            reached: error,
+            standard_error,
+            met: measured(&kept.report).is_some_and(|step| step.meets(self.error)),
+            points: held_out.points.len(),
+            paths: held_out.paths(),
+            steps: reports,
+            noise,
+            stopped_because: stop.because,
+            message: stop.message,
+            next,
+            time_s: started.elapsed().as_secs_f64(),
+        };
+        Ok(Found { config: kept.config, baked: kept.baked, report })
+    }
+
+    fn config(&self, choice: Choice) -> Config {
+        let mut config = self.config.with_samples(choice.samples);
+        config.grid.spacing_m = Some(choice.spacing_m);
+        config
+    }
+
+    /// Bakes, and asks what would be read of the file.
+    fn judge(
+        &self,
+        choice: Choice,
+        circumstances: &Circumstances,
+        held_out: &HeldOut,
+        prepared: &impl Fn(&Prepared),
+    ) -> Result<Judged, BakeError> {
+        let started = Instant::now();
+        let config = self.config(choice);
+        let bake = prepare(self.world, &config, circumstances)?;
+        prepared(&bake);
+        let baked = bake.bake(circumstances, self.scene)?;
+        let time_s = started.elapsed().as_secs_f64();
+        let file = file::as_read(&baked.container, self.output)?;
+        let volume = file.volume_as_planned(self.world.scene.origin_world);
+        let query = Query { volume: &volume, settings: &file.query.weights };
+        let ask = |(_, point): &(_, _)| query.irradiance(point, Visibility::Stored);
+        let found: Vec<Vec3> = held_out.points.par_iter().map(ask).collect();
+        let error = sampled::relative(&found, &held_out.truth);
+        let report = StepReport {
+            spacing_m: choice.spacing_m,
+            samples_factor: choice.samples,
+            probes: volume.states.len(),
+            error: error.map(|(error, _)| error),
+            standard_error: error.map(|(_, standard_error)| standard_error),
+            bytes: file.file_bytes,
+            time_s,
+        };
+        Ok(Judged { config, baked, found, report })
+    }
+
+    /// What random numbers of the bake add to its error: half of the squared difference from the same bake by others.
+    fn noise(&self, of: &Judged, held_out: &HeldOut) -> Result<NoiseReport, BakeError> {
+        let circumstances =
+            Circumstances { seed: self.circumstances.seed.wrapping_add(1), ..self.circumstances.clone() };
+        let choice = Choice { spacing_m: of.report.spacing_m, samples: of.report.samples_factor };
+        let other = self.judge(choice, &circumstances, held_out, &|_| ())?;
+        let error = sampled::relative_difference(&of.found, &other.found, &held_out.truth);
+        Ok(NoiseReport { error: error.unwrap_or(0.0) / 2f64.sqrt(), time_s: other.report.time_s })
+    }
+
+    fn probes(&self, choice: Choice) -> Result<u64, BakeError> {
+        let config = self.config(choice);
+        Ok(Grid::refined(&config.grid, config.placement.refine, self.world.scene)?.probe_count() as u64)
+    }
+
+    /// The spacing that is there; where it has more probes than allowed, one larger.
+    fn first(&self) -> Result<Choice, SearchError> {
+        let spacing_m = self.config.grid.spacing_in(self.world.scene).map_err(BakeError::from)?;
+        let mut choice = Choice { spacing_m, samples: 1 };
+        let mut least = u64::MAX;
+        loop {
+            let probes = self.probes(choice)?;
+            if probes <= self.most_probes {
+                return Ok(choice);
+            }
+            // Twice the spacing has fewer probes, as long as there are several cells.
+            if probes >= least {
+                return Err(SearchError::TooFew { most: self.most_probes, least });
+            }
+            least = probes;
+            choice.spacing_m = rule::rounded_up(choice.spacing_m / rule::FINEST_STEP);
+        }
+    }
+
+    /// The choice, or one as near to it as the limit of probes allows.
+    fn within_limit(&self, choice: Choice, steps: &[Step]) -> Result<Choice, Stop> {
+        /// Spacings that are tried are so far apart.
+        const RATIO: f64 = 1.05;
+        let finest = steps.iter().map(|s| s.spacing_m).fold(f64::INFINITY, f64::min);
+        let mut tried = choice;
+        loop {
+            let probes = self.probes(tried);
+            if probes.as_ref().is_ok_and(|&probes| probes <= self.most_probes) {
+                return Ok(tried);
+            }
+            tried.spacing_m = rule::rounded_up(tried.spacing_m * RATIO);
+            if tried.spacing_m > rule::LEAST_STEP * finest {
+                let spacing_m = format::significant(choice.spacing_m, 3);
+                let what = match probes {
+                    Ok(_) => {
+                        format!("a grid of {spacing_m} m has more than {} probes (--max-probes)", self.most_probes)
+                    }
+                    Err(error) => error.to_string(),
+                };
+                return Err(Stop::of(StoppedBecause::Probes, &what));
+            }
+        }
+    }
+
+    /// What the bake would be that follows: that of the rule, or with half the spacing where the error is reached.
+    fn next(&self, steps: &[Step], kept: &Judged, noise: Option<NoiseReport>) -> Option<NextReport> {
+        let known = noise.map(|noise| noise.error);
+        let from = measured(&kept.report)?;
+        let choice = if from.meets(self.error) { rule::halved(&from) } else { rule::finer(steps, self.error, known) };
+        let more = self.probes(choice).ok()? as f64 / kept.report.probes as f64;
+        let samples = f64::from(choice.samples) / f64::from(kept.report.samples_factor);
+        Some(NextReport {
+            spacing_m: choice.spacing_m,
+            samples_factor: choice.samples,
+            predicted_error: rule::predicted(steps, &from, &choice, known),
+            predicted_bytes: (more * kept.report.bytes as f64) as u64,
+            predicted_time_s: more * samples * kept.report.time_s,
+        })
+    }
+}
+
+impl Stop {
+    fn of(because: StoppedBecause, message: &str) -> Stop {
+        Stop { because, message: message.to_owned() }
+    }
+}
+
+fn nothing_to_judge_by(held_out: &HeldOut) -> Stop {
+    if held_out.points.is_empty() {
+        let what = "no surface faces the box of the probes (grid.bounds), so that there is nothing to judge a bake by";
+        return Stop::of(StoppedBecause::NoSurface, what);
+    }
+    let what = "no indirect light arrives at the surfaces, so that no error is relative to it";
+    Stop::of(StoppedBecause::Dark, what)
+}
+
+fn measured(report: &StepReport) -> Option<Step> {
+    Some(Step {
+        spacing_m: report.spacing_m,
+        samples: report.samples_factor,
+        error: report.error?,
+        standard_error: report.standard_error?,
+        bytes: report.bytes,
+    })
+}

@@ -171,9 +171,6 @@ class Probes:
             mask_of = lambda v: 0 if (word := int(words[part(v)])) & 1 << 13 else word & 255
             mask = self.beside(voxel, fraction, n, mask_of)
         far = mask == 0 and int(words[own]) & 1 << 14
-        # The air is never without light.
-        if mask == 0 and int(words[own]) & 1 << 13:
-            mask = 255
         return mask, number(own + 1) if far else None
 
     def beside(self, voxel, fraction, n, mask_of):

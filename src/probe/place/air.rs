@@ -28,6 +28,9 @@ pub fn bounds(world: &World, grid: &Grid) -> (Vec3, Vec3) {
     (low, high)
 }
 
+/// Places that one which sees no probe looks for.
+const NEAREST: usize = 64;
+
 /// Which of their cell's probes places in the air see, for each cell that has surfaces, and the rays that told.
 pub fn seen(world: &World, grid: &Grid, placement: &Placement, table: &SurfaceVisibility) -> (Vec<Vec<u8>>, u64) {
     let of_cell = |cell: u32| {
@@ -44,9 +47,24 @@ pub fn seen(world: &World, grid: &Grid, placement: &Placement, table: &SurfaceVi
             active >> corner & 1 == 1 && !world.tracer.occluded(Ray::segment(start, place, 0))
         };
         let mask = |place| (0..8).fold(0, |mask, corner| mask | u8::from(sees(place, corner)) << corner);
-        let masks: Vec<u8> = air_places(table.voxels_per_cell).map(mask).collect();
-        let rays = masks.len() as u64 * u64::from(active.count_ones());
-        (masks, rays)
+        let places: Vec<Vec3> = air_places(table.voxels_per_cell).collect();
+        let seen: Vec<u8> = places.iter().map(|&place| mask(place)).collect();
+        let mut rays = seen.len() as u64 * u64::from(active.count_ones());
+        // A place that sees no probe takes what the nearest sees that it can see itself: things there may peep out at both.
+        let at = |i: usize| low + places[i] * sides;
+        let masks = (0..seen.len()).map(|i| {
+            if seen[i] != 0 {
+                return seen[i];
+            }
+            let mut others: Vec<usize> = (0..seen.len()).filter(|&other| seen[other] != 0).collect();
+            others.sort_by(|&a, &b| at(a).distance_squared(at(i)).total_cmp(&at(b).distance_squared(at(i))));
+            let mut sees = |&&other: &&usize| {
+                rays += 1;
+                !world.tracer.occluded(Ray::segment(at(i), at(other), 0))
+            };
+            others.iter().take(NEAREST).find(&mut sees).map_or(0, |&other| seen[other])
+        });
+        (masks.collect::<Vec<u8>>(), rays)
     };
     let found: Vec<(Vec<u8>, u64)> = (0..grid.cell_count() as u32).into_par_iter().map(of_cell).collect();
     let rays = found.iter().map(|(_, rays)| rays).sum();

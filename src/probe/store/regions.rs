@@ -9,8 +9,7 @@
 //! bits 13–14 axis (x, y, z, facing), bits 8–12 threshold t, bits 0–7 how many words farther on the part at and beyond t
 //! begins. The part below t follows. Where 8 bits are too few they are 0, and two words with the distance (low, high) come
 //! between. A word with bit 15 ends: bits 0–7 mask, bit 13 that no surface is in the part. Where the mask is 0 and bit 14 is
-//! set, two words follow, low and high, of the number of a probe farther away that the surface sees. In the air (bit 13) a mask
-//! of 0 means all.
+//! set, two words follow, low and high, of the number of a probe farther away that the surface sees.
 
 mod grow;
 #[cfg(test)]
@@ -70,12 +69,7 @@ impl Regions {
         match self.mask(leaf) {
             0 => {
                 let beside = beside(fraction, n, strip, |voxel| self.surface_mask(self.leaf(root, voxel, facing)));
-                match (beside, self.far(leaf)) {
-                    // Nothing was found in the air of this part, but what asks there sees something most of the time.
-                    (0, None) if self.is_air(leaf) => Seen { mask: u8::MAX, far: None },
-                    (0, far) => Seen { mask: 0, far },
-                    (mask, _) => Seen { mask, far: None },
-                }
+                Seen { mask: beside, far: if beside == 0 { self.far(leaf) } else { None } }
             }
             mask => Seen { mask, far: None },
         }
@@ -108,12 +102,7 @@ impl Regions {
 
     /// What surfaces see there; 0 where there are none.
     fn surface_mask(&self, leaf: usize) -> u8 {
-        if self.is_air(leaf) { 0 } else { self.mask(leaf) }
-    }
-
-    /// Whether no surface is in the part.
-    fn is_air(&self, leaf: usize) -> bool {
-        self.words[leaf] & AIR != 0
+        if self.words[leaf] & AIR == 0 { self.mask(leaf) } else { 0 }
     }
 
     fn far(&self, leaf: usize) -> Option<ProbeIndex> {

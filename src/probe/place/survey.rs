@@ -81,9 +81,11 @@ struct Side {
 struct Tally {
     /// At most eight for each point.
     rays: u64,
-    /// Points that see any probe at all. The others lie inside solids where walls meet, and have no vote.
+    /// Points that see any probe at all. The others mostly lie inside solids where walls meet, and have no vote.
     points: u32,
-    /// Of these, how many see each corner.
+    /// Whether one of the others lies in the open: what it faces is no back.
+    is_open: bool,
+    /// How many points see each corner.
     visible: [u32; 8],
 }
 
@@ -277,12 +279,12 @@ impl Look<'_, '_> {
                 1 => (all(&|side| !is_outside(side), true), settings.first_points),
                 _ => (all(&|_| true, false), settings.first_points),
             };
-            found.asks |= tier == 0 && !pieces.is_empty();
             if pieces.is_empty() {
                 continue;
             }
             let tally = self.tally(&pieces, active, search, tier);
             found.rays += tally.rays;
+            found.asks |= tier == 0 && tally.is_open;
             if tally.points > 0 {
                 found.mask = tally.majority();
                 break;
@@ -322,7 +324,8 @@ impl Look<'_, '_> {
             let normal = if side.is_back { -front } else { front };
             let facet = Facet { position, normal, offset: ray_offset(corners) };
             // Where the first points see nothing, the others mostly lie inside a solid: one ray tells.
-            if tried >= first && tally.points == 0 {
+            let is_last_hope = tried >= first && tally.points == 0;
+            if is_last_hope {
                 tally.rays += 1;
                 if self.is_buried(&facet, salt) {
                     continue;
@@ -340,6 +343,10 @@ impl Look<'_, '_> {
                 seen |= u8::from(!world.tracer.occluded(Ray::segment(origin, target, salt))) << corner;
             }
             tally.points += u32::from(seen != 0);
+            if seen == 0 && !tally.is_open {
+                tally.rays += u64::from(!is_last_hope);
+                tally.is_open = is_last_hope || !self.is_buried(&facet, salt);
+            }
             (0..8).for_each(|corner| tally.visible[corner] += u32::from(seen >> corner & 1));
         }
         tally

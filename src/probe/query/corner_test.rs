@@ -90,13 +90,12 @@ impl CornerTest for SurfaceTest<'_> {
 /// The same as trees.
 pub struct RegionsTest<'v> {
     pub regions: &'v Regions,
-    pub strip: f32,
 }
 
 impl CornerTest for RegionsTest<'_> {
     #[inline]
     fn seen(&self, grid: &Grid, cell: &Cell, point: &QueryPoint, biased: Vec3) -> Seen {
-        self.regions.look_up(grid, cell, biased, point.facing, self.strip)
+        self.regions.look_up(grid, cell, biased, point.facing)
     }
 
     #[inline]

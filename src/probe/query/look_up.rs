@@ -44,7 +44,7 @@ impl<'v> Query<'v> {
                     occlusion.moments().map(moments).or_else(|| occlusion.tiles().map(tiles))
                 }
                 VisibilityTest::Table(test) | VisibilityTest::Everywhere(test) => match occlusion.regions() {
-                    Some(regions) => Some(Test::Regions(RegionsTest { regions, strip: test.strip })),
+                    Some(regions) => Some(Test::Regions(RegionsTest { regions })),
                     None => {
                         let everywhere = matches!(self.settings.test, VisibilityTest::Everywhere(_));
                         occlusion.surface().map(|table| Test::Surface(SurfaceTest { table, test, everywhere }))

@@ -8,8 +8,8 @@
 //! Storage: u16 words, `roots[c]` the first of cell c's tree; cells with the same tree share it. A word below 2¹⁵ divides:
 //! bits 13–14 axis (x, y, z, facing), bits 8–12 threshold t, bits 0–7 how many words farther on the part at and beyond t
 //! begins. The part below t follows. Where 8 bits are too few they are 0, and two words with the distance (low, high) come
-//! between. A word with bit 15 ends: bits 0–7 mask, bit 13 that no surface is in the part. Where the mask is 0 and bit 14 is
-//! set, two words follow, low and high, of the number of a probe farther away that the surface sees.
+//! between. A word with bit 15 ends: bits 0–7 mask. Where the mask is 0 and bit 14 is set, two words follow, low and high, of
+//! the number of a probe farther away that the surface sees.
 
 mod grow;
 #[cfg(test)]
@@ -23,8 +23,8 @@ use rayon::prelude::*;
 use safetensors::Dtype;
 
 pub use self::grow::air_places;
-use self::words::{AIR, AXIS_SHIFT, FAR, LEAF, LOW, NUMBER, Part, THRESHOLD_SHIFT, distance, length, number};
-use super::surface::{Facing, MAX_VOXELS_PER_CELL, Seen, SurfaceVisibility, beside, voxel_of};
+use self::words::{AXIS_SHIFT, FAR, LEAF, LOW, NUMBER, Part, THRESHOLD_SHIFT, distance, length, number};
+use super::surface::{Facing, MAX_VOXELS_PER_CELL, Seen, SurfaceVisibility, voxel_of};
 use crate::probe::container::Container;
 use crate::probe::lattice::grid::{Cell, CellIndex, Grid, ProbeIndex};
 
@@ -37,8 +37,8 @@ pub struct Regions {
 }
 
 impl Regions {
-    /// The trees of a table. Entries and their strips answer as the table does, the air about as `air` says: what the
-    /// [`air_places`] of each cell see, or nothing where that is not known.
+    /// The trees of a table. Entries answer as they do there, the air about as `air` says: what the [`air_places`] of each cell
+    /// see, or nothing where that is not known.
     pub fn new(grid: &Grid, table: &SurfaceVisibility, air: &[Vec<u8>]) -> Regions {
         let air = |cell: u32| air.get(cell as usize).map_or(&[][..], Vec::as_slice);
         let trees: Vec<Vec<u16>> = (0..grid.cell_count() as u32)
@@ -59,20 +59,12 @@ impl Regions {
     }
 
     /// What a point of a cell sees. `at` is a point of the cell, or stands for its nearest one; `facing` is the surface's main
-    /// direction; `strip` as in [`super::surface::TableTest`].
+    /// direction.
     #[inline]
-    pub fn look_up(&self, grid: &Grid, cell: &Cell, at: Vec3, facing: Facing, strip: f32) -> Seen {
-        let n = self.voxels_per_cell;
-        let fraction = grid.fraction_in(cell, at);
+    pub fn look_up(&self, grid: &Grid, cell: &Cell, at: Vec3, facing: Facing) -> Seen {
         let root = self.roots[grid.cell_index(cell).0 as usize] as usize;
-        let leaf = self.leaf(root, voxel_of(fraction, n), facing);
-        match self.mask(leaf) {
-            0 => {
-                let beside = beside(fraction, n, strip, |voxel| self.surface_mask(self.leaf(root, voxel, facing)));
-                Seen { mask: beside, far: if beside == 0 { self.far(leaf) } else { None } }
-            }
-            mask => Seen { mask, far: None },
-        }
+        let leaf = self.leaf(root, voxel_of(grid.fraction_in(cell, at), self.voxels_per_cell), facing);
+        Seen { mask: self.mask(leaf), far: self.far(leaf) }
     }
 
     /// The word that ends at a voxel.
@@ -98,11 +90,6 @@ impl Regions {
     #[inline]
     fn mask(&self, leaf: usize) -> u8 {
         (self.words[leaf] & LOW) as u8
-    }
-
-    /// What surfaces see there; 0 where there are none.
-    fn surface_mask(&self, leaf: usize) -> u8 {
-        if self.words[leaf] & AIR == 0 { self.mask(leaf) } else { 0 }
     }
 
     fn far(&self, leaf: usize) -> Option<ProbeIndex> {

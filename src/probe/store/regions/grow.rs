@@ -1,10 +1,10 @@
 //! How a cell is divided: greedily, by the plane that leaves the least entropy of masks (Quinlan, *Induction of Decision
 //! Trees*, 1986), until what the entries answer is exact.
 
-use glam::{IVec3, UVec3, Vec3};
+use glam::{UVec3, Vec3};
 
 use super::super::surface::{Entry, Facing, SurfaceVisibility, voxel_of};
-use super::words::{AIR, AXIS_SHIFT, FAR, LEAF, LOW, NUMBER, THRESHOLD_SHIFT, words_of};
+use super::words::{AXIS_SHIFT, FAR, LEAF, LOW, NUMBER, THRESHOLD_SHIFT, words_of};
 use crate::probe::lattice::grid::CellIndex;
 
 /// What a part answers: a mask, or one of these.
@@ -20,19 +20,10 @@ struct Sample {
     /// Voxel and facing.
     at: [u8; 4],
     answer: Answer,
-    kind: Kind,
+    /// Whether a surface asks there: the answer has to be exact. In the air it may be wrong where that saves words.
+    is_surface: bool,
     /// Number of the answer among those of the part that is being divided.
     number: u32,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Kind {
-    /// A surface: the answer has to be exact.
-    Entry,
-    /// No surface, beside an entry that sees nothing, which must not take this for one. The answer is that entry's.
-    Beside,
-    /// The air: the answer may be wrong where that saves words.
-    Air,
 }
 
 /// Weights in the entropy. Surfaces count more than the air between them.
@@ -61,7 +52,7 @@ pub fn air_places(voxels_per_cell: u32) -> impl Iterator<Item = Vec3> {
 /// Buffers that cells share.
 #[derive(Default)]
 pub struct Grower {
-    /// By key: whether there is a sample that has to be exact.
+    /// By key: whether a surface asks there.
     is_known: Vec<bool>,
     samples: Vec<Sample>,
 }
@@ -81,20 +72,17 @@ impl Grower {
         self.is_known.clear();
         self.is_known.resize(n.pow(3) as usize * 6, false);
         for entry in &entries {
-            self.add(n, entry.voxel, entry, Kind::Entry, answer(table, entry));
-        }
-        let surfaces = self.is_known.clone();
-        // Where an entry sees nothing, points close to its border ask beside, but only what surfaces answer there.
-        for entry in entries.iter().filter(|entry| entry.mask == 0) {
-            for neighbour in neighbours(entry.voxel, n) {
-                self.add(n, neighbour, entry, Kind::Beside, answer(table, entry));
-            }
+            let facing = Facing::of(entry.facing);
+            self.is_known[Self::place(n, entry.voxel, facing)] = true;
+            self.add(entry.voxel, facing, answer(table, entry), true);
         }
         // Who sees none of the eight is inside of something, or cannot be helped.
         for (place, &mask) in air_places(n).zip(air).filter(|(_, mask)| **mask != 0) {
             let voxel = voxel_of(place, n);
-            for facing in Facing::ALL.into_iter().filter(|&facing| !surfaces[Self::place(n, voxel, facing)]) {
-                self.samples.push(Sample { at: at(voxel, facing), answer: mask.into(), kind: Kind::Air, number: 0 });
+            for facing in Facing::ALL {
+                if !self.is_known[Self::place(n, voxel, facing)] {
+                    self.add(voxel, facing, mask.into(), false);
+                }
             }
         }
         grow(&mut self.samples, &mut words);
@@ -105,18 +93,10 @@ impl Grower {
         ((voxel.x + n * (voxel.y + n * voxel.z)) * 6) as usize + usize::from(facing.index())
     }
 
-    /// A sample that is not of the air, where there is none.
-    fn add(&mut self, n: u32, voxel: UVec3, entry: &Entry, kind: Kind, answer: Answer) {
-        let facing = Facing::of(entry.facing);
-        let is_known = &mut self.is_known[Self::place(n, voxel, facing)];
-        if !std::mem::replace(is_known, true) {
-            self.samples.push(Sample { at: at(voxel, facing), answer, kind, number: 0 });
-        }
+    fn add(&mut self, voxel: UVec3, facing: Facing, answer: Answer, is_surface: bool) {
+        let at = [voxel.x as u8, voxel.y as u8, voxel.z as u8, facing.index()];
+        self.samples.push(Sample { at, answer, is_surface, number: 0 });
     }
-}
-
-fn at(voxel: UVec3, facing: Facing) -> [u8; 4] {
-    [voxel.x as u8, voxel.y as u8, voxel.z as u8, facing.index()]
 }
 
 fn answer(table: &SurfaceVisibility, entry: &Entry) -> Answer {
@@ -125,14 +105,6 @@ fn answer(table: &SurfaceVisibility, entry: &Entry) -> Answer {
         (0, None) => NOTHING,
         (mask, _) => Answer::from(mask),
     }
-}
-
-/// The up to 26 voxels around one within its cell.
-fn neighbours(voxel: UVec3, n: u32) -> impl Iterator<Item = UVec3> {
-    let offset = |i: i32| IVec3::new(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
-    let inside = move |v: &IVec3| v.cmpge(IVec3::ZERO).all() && v.cmplt(IVec3::splat(n as i32)).all();
-    let all = (0..27).filter(|&i| i != 13).map(move |i| voxel.as_ivec3() + offset(i));
-    all.filter(inside).map(|v| v.as_uvec3())
 }
 
 /// Appends the tree of some samples. Parts that differ in the air alone are put together again where telling them apart mends
@@ -173,32 +145,26 @@ fn grow(samples: &mut [Sample], words: &mut Vec<u16>) -> u32 {
 #[derive(Debug, Clone, Copy)]
 struct End {
     answer: Answer,
-    has_surface: bool,
     /// In the air, bits.
     wrong: u32,
 }
 
 impl End {
     /// The part of some samples: it answers as its surfaces do, and without any as most of its air. `None` where the surfaces
-    /// differ, or one sees something where there must be none.
+    /// differ.
     fn of(samples: &[Sample]) -> Option<End> {
-        let answers = |kind: Kind| samples.iter().filter(move |s| s.kind == kind).map(|s| s.answer);
-        let mut entries = answers(Kind::Entry);
-        let beside = answers(Kind::Beside).next();
-        let entry = entries.next();
-        let answer = match entry {
-            Some(first) => {
-                let holds = entries.all(|answer| answer == first) && (beside.is_none() || mask(first) == 0);
-                holds.then_some(first)?
-            }
-            None => most(answers(Kind::Air)).or(beside)?,
+        let answers = |is_surface: bool| samples.iter().filter(move |s| s.is_surface == is_surface).map(|s| s.answer);
+        let mut surfaces = answers(true);
+        let answer = match surfaces.next() {
+            Some(first) => surfaces.all(|answer| answer == first).then_some(first)?,
+            None => most(answers(false))?,
         };
         let given = mask(answer);
         let wrong_of = |seen: Answer| match mask(seen) {
             seen if seen & given == 0 => BLACK,
             seen => (seen ^ given).count_ones(),
         };
-        Some(End { answer, has_surface: entry.is_some(), wrong: answers(Kind::Air).map(wrong_of).sum() })
+        Some(End { answer, wrong: answers(false).map(wrong_of).sum() })
     }
 
     fn words(&self) -> u32 {
@@ -206,14 +172,13 @@ impl End {
     }
 
     fn push(&self, words: &mut Vec<u16>) {
-        let air = if self.has_surface { 0 } else { AIR };
         match self.answer {
-            NOTHING => words.push(LEAF | air),
+            NOTHING => words.push(LEAF),
             FARTHER.. => {
-                words.push(LEAF | FAR | air);
+                words.push(LEAF | FAR);
                 words.extend(words_of(self.answer - FARTHER));
             }
-            mask => words.push(LEAF | air | mask as u16),
+            mask => words.push(LEAF | mask as u16),
         }
     }
 }
@@ -257,9 +222,9 @@ fn plane(samples: &mut [Sample], is_surface: bool) -> (usize, u8) {
         let mut sides = vec![0u32; size];
         for sample in samples.iter() {
             let place = usize::from(sample.at[axis]);
-            sides[place] += u32::from(sample.kind != Kind::Air || !is_surface);
+            sides[place] += u32::from(sample.is_surface || !is_surface);
             counts[place * answers.len() + sample.number as usize] +=
-                if sample.kind == Kind::Air { AIR_WEIGHT } else { SURFACE_WEIGHT };
+                if sample.is_surface { SURFACE_WEIGHT } else { AIR_WEIGHT };
         }
         let (mut below, mut beyond) = (Tally::new(answers.len()), Tally::new(answers.len()));
         for of_place in counts.chunks(answers.len()) {
@@ -281,7 +246,27 @@ fn plane(samples: &mut [Sample], is_surface: bool) -> (usize, u8) {
             }
         }
     }
-    (best.1, best.2)
+    (best.1, within_gap(samples, best.1, best.2))
+}
+
+/// Where a plane lies best in the gap of samples that it is in: next to a surface, for the air goes on up to it, or else in the
+/// middle.
+fn within_gap(samples: &[Sample], axis: usize, threshold: u8) -> u8 {
+    // The nearest sample on either side, and whether a surface is among those there.
+    let (mut below, mut beyond) = ((0, false), (u8::MAX, false));
+    for sample in samples {
+        let (at, is_surface) = (sample.at[axis], sample.is_surface);
+        if at < threshold {
+            below = below.max((at, is_surface));
+        } else if at < beyond.0 || at == beyond.0 && is_surface {
+            beyond = (at, is_surface);
+        }
+    }
+    match (below.1, beyond.1) {
+        (true, false) => below.0 + 1,
+        (false, true) => beyond.0,
+        _ => (below.0 + 1 + beyond.0) / 2,
+    }
 }
 
 /// Weights of the answers on one side of a plane.

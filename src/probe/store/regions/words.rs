@@ -6,8 +6,6 @@ use crate::probe::store::surface::Facing;
 pub const LEAF: u16 = 1 << 15;
 /// Bit of a word that ends: a probe farther away follows.
 pub const FAR: u16 = 1 << 14;
-/// Bit of a word that ends: no surface is in the part.
-pub const AIR: u16 = 1 << 13;
 pub const AXIS_SHIFT: u32 = 13;
 pub const THRESHOLD_SHIFT: u32 = 8;
 /// Bits of the distance, and of the mask.

@@ -10,7 +10,7 @@ use crate::light::World;
 use crate::math::color::luminance;
 use crate::probe::Volume;
 use crate::probe::capture::CaptureSettings;
-use crate::probe::query::Query;
+use crate::probe::query::Answers;
 use crate::probe::transport::truth::Truth;
 use crate::report::baked::{self, BakedReport};
 use crate::report::reference_layers::ReferenceLayers;
@@ -69,21 +69,21 @@ pub struct Seen<'a> {
 
 impl Scenery<'_, '_> {
     /// Which probes the view's points see, and the seconds that it took to find out.
-    pub fn masks(&self, query: &Query) -> (Vec<u8>, f64) {
+    pub fn masks(&self, query: &impl Answers) -> (Vec<u8>, f64) {
         let started = Instant::now();
         let masks = exact_masks(self.world, query, &self.view.points);
         (masks, started.elapsed().as_secs_f64())
     }
 
     /// Points of free air, and which probes they see.
-    pub fn air(&self, query: &Query) -> Air {
+    pub fn air(&self, query: &impl Answers) -> Air {
         Air::new(self.world, query, self.seed)
     }
 
     /// The three ways of treating visibility; `step` is called after each.
     pub fn shade(
         &self,
-        query: &Query,
+        query: &impl Answers,
         Seen { masks, masks_s, air }: Seen,
         bytes_per_probe: f64,
         step: impl Fn(),
@@ -119,7 +119,7 @@ impl Scenery<'_, '_> {
     /// The same probes with other light in them; times and bytes are those of `like`.
     pub fn shade_again(
         &self,
-        query: &Query,
+        query: &impl Answers,
         Seen { masks, air, .. }: Seen,
         mode: VisibilityMode,
         name: &'static str,
@@ -174,10 +174,10 @@ impl Shaded {
 }
 
 /// Share of the view's points outside the probes' hull.
-fn outside_hull(query: &Query, view: &View) -> Option<f64> {
+fn outside_hull(query: &impl Answers, view: &View) -> Option<f64> {
     /// Points on the hull's faces lie inside, whatever rounding makes of them; spacings.
     const TOLERANCE: f32 = 1e-4;
-    let (low, high) = query.volume.grid.hull(TOLERANCE);
+    let (low, high) = query.grid().hull(TOLERANCE);
     let is_outside = |p: Vec3| p.cmplt(low).any() || p.cmpgt(high).any();
     let (mut outside, mut all) = (0.0f64, 0.0f64);
     for point in &view.points {

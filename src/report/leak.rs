@@ -11,7 +11,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::reference_layers::ReferenceLayers;
 use crate::math::color::luminance;
 use crate::math::statistics::Moments;
-use crate::probe::query::Query;
+use crate::probe::query::Answers;
 use crate::shade::points::ImagePoint;
 use crate::shade::visibility_modes::VisibilityMode;
 
@@ -107,7 +107,7 @@ fn quantiles(blocks: Option<u32>) -> Vec<f64> {
 /// The leak figures of one visibility mode, except `dark_region` and `baked`. `irradiance` is that of the mode and
 /// `exact` that of [`VisibilityMode::Ray`], both per point.
 pub fn measure(
-    query: &Query,
+    query: &impl Answers,
     points: &[ImagePoint],
     masks: &[u8],
     mode: VisibilityMode,
@@ -136,7 +136,7 @@ pub fn measure(
         let sum = f64::from(corners.total());
         for k in (0..8).filter(|&k| corners.weights[k] > 0.0) {
             let weight = f64::from(corners.weights[k]) / sum;
-            let contribution = luminance(query.volume.probe_irradiance(corners.probes[k], point.query.normal));
+            let contribution = luminance(query.probe_irradiance(corners.probes[k], point.query.normal));
             let contribution = f64::from(contribution) * weight * share;
             from_all += contribution;
             if masks[i] >> k & 1 == 0 {

@@ -19,9 +19,9 @@ use crate::light::surface::SurfacePoint;
 use crate::math::blocks::{BLOCK, Block};
 use crate::math::random::{Purpose, Random};
 use crate::math::sampling::uniform_sphere;
-use crate::probe::Volume;
+use crate::probe::lattice::Grid;
 use crate::probe::place::{SettleSettings, Settler, air};
-use crate::probe::query::{Query, QueryPoint};
+use crate::probe::query::{Answers, QueryPoint};
 use crate::probe::store::surface::Facing;
 use crate::trace::Ray;
 
@@ -56,19 +56,19 @@ pub struct AirTruth {
 
 impl Air {
     /// Looks for points and for what they see.
-    pub fn new(world: &World, query: &Query, seed: u64) -> Air {
-        let points = Arc::new(points(world, query.volume, seed));
+    pub fn new(world: &World, query: &impl Answers, seed: u64) -> Air {
+        let points = Arc::new(points(world, query.grid(), seed));
         Air::of(world, query, points)
     }
 
     /// Of points that are known.
-    pub fn of(world: &World, query: &Query, points: Arc<Vec<QueryPoint>>) -> Air {
+    pub fn of(world: &World, query: &impl Answers, points: Arc<Vec<QueryPoint>>) -> Air {
         let masks = masks(world, query, &points);
         Air { points, masks }
     }
 
     /// Irradiance from the probes at every point, W·m⁻².
-    pub fn irradiance(&self, query: &Query, mode: VisibilityMode) -> Vec<Vec3> {
+    pub fn irradiance(&self, query: &impl Answers, mode: VisibilityMode) -> Vec<Vec3> {
         let asked = self.points.par_iter().zip(&self.masks);
         asked.map(|(point, &mask)| query.irradiance(point, mode.visibility(mask))).collect()
     }
@@ -91,20 +91,20 @@ impl Air {
 }
 
 /// Points of free air. They depend on the scene, on the [`bounds`] and on the seed alone.
-pub fn points(world: &World, volume: &Volume, seed: u64) -> Vec<QueryPoint> {
-    (0..POINTS).into_par_iter().filter_map(|index| point(world, volume, seed, index)).collect()
+pub fn points(world: &World, grid: &Grid, seed: u64) -> Vec<QueryPoint> {
+    (0..POINTS).into_par_iter().filter_map(|index| point(world, grid, seed, index)).collect()
 }
 
 /// The box of the points, see [`air::bounds`].
-pub fn bounds(world: &World, volume: &Volume) -> (Vec3, Vec3) {
-    air::bounds(world, &volume.grid)
+pub fn bounds(world: &World, grid: &Grid) -> (Vec3, Vec3) {
+    air::bounds(world, grid)
 }
 
 /// The point of an index; `None` where all that is tried lies inside geometry.
-fn point(world: &World, volume: &Volume, seed: u64, index: u32) -> Option<QueryPoint> {
-    let (low, high) = bounds(world, volume);
+fn point(world: &World, grid: &Grid, seed: u64, index: u32) -> Option<QueryPoint> {
+    let (low, high) = bounds(world, grid);
     let settings = SettleSettings::default();
-    let settler = Settler { world, grid: &volume.grid, settings: &settings };
+    let settler = Settler { world, grid, settings: &settings };
     let mut random = Random::new(seed, Purpose::Air, u64::from(index), 0);
     let mut place = || {
         let share = Vec3::new(random.uniform(), random.uniform(), random.uniform());
@@ -117,16 +117,15 @@ fn point(world: &World, volume: &Volume, seed: u64, index: u32) -> Option<QueryP
 }
 
 /// Which probes of its cell each point sees. Nothing is in the way but the scene: the point lies on no surface.
-fn masks(world: &World, query: &Query, points: &[QueryPoint]) -> Vec<u8> {
-    let volume = query.volume;
-    let contacts = Contacts::of_points(world.scene, &volume.positions);
+fn masks(world: &World, query: &impl Answers, points: &[QueryPoint]) -> Vec<u8> {
+    let contacts = Contacts::of_points(world.scene, query.positions());
     let mask = |(index, point): (usize, &QueryPoint)| {
-        let corners = volume.grid.corners_around(&query.cell(point));
+        let corners = query.corners(point);
         corners.into_iter().enumerate().fold(0, |mask, (i, probe)| {
             let contact = contacts.of(probe.0 as usize);
-            let target = contact.map_or(volume.position(probe), |contact| contact.target(point.position));
+            let target = contact.map_or(query.positions()[probe.0 as usize], |contact| contact.target(point.position));
             let sees = || !world.tracer.occluded(Ray::segment(point.position, target, index as u32));
-            mask | u8::from(volume.is_active(probe) && sees()) << i
+            mask | u8::from(query.is_active(probe) && sees()) << i
         })
     };
     points.par_iter().enumerate().map(mask).collect()

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::points::ImagePoint;
 use crate::light::World;
 use crate::light::contact::{Contacts, Facet, sight_line};
-use crate::probe::query::{Query, Visibility};
+use crate::probe::query::{Answers, Visibility};
 use crate::trace::Ray;
 
 /// Number of times that shading is repeated to measure its time.
@@ -58,21 +58,20 @@ impl VisibilityMode {
 /// on the viewer's side and ε the ray offset of the surface. The segment starts at the surface, as in the survey,
 /// because ε accounts for the rounding there. A ray from a probe farther from the scene's origin would need a larger
 /// offset. Probes in the plane of a surface follow [`sight_line`].
-pub fn exact_masks(world: &World, query: &Query, points: &[ImagePoint]) -> Vec<u8> {
-    let volume = query.volume;
-    let contacts = Contacts::of_points(world.scene, &volume.positions);
+pub fn exact_masks(world: &World, query: &impl Answers, points: &[ImagePoint]) -> Vec<u8> {
+    let contacts = Contacts::of_points(world.scene, query.positions());
     points
         .par_iter()
         .map(|point| {
             let surface = &point.surface;
             let facet =
                 Facet { position: surface.position, normal: surface.geometric_normal, offset: surface.ray_offset };
-            let corners = volume.grid.corners_around(&query.cell(&point.query));
+            let corners = query.corners(&point.query);
             corners.into_iter().enumerate().fold(0, |mask, (i, probe)| {
                 let contact = contacts.of(probe.0 as usize);
                 let is_free = |(origin, target)| !world.tracer.occluded(Ray::segment(origin, target, point.pixel));
-                let visible =
-                    volume.is_active(probe) && sight_line(&facet, volume.position(probe), contact).is_some_and(is_free);
+                let position = query.positions()[probe.0 as usize];
+                let visible = query.is_active(probe) && sight_line(&facet, position, contact).is_some_and(is_free);
                 mask | u8::from(visible) << i
             })
         })
@@ -80,12 +79,12 @@ pub fn exact_masks(world: &World, query: &Query, points: &[ImagePoint]) -> Vec<u
 }
 
 /// Irradiance from the probes at every point, W·m⁻².
-pub fn irradiance(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<Vec3> {
+pub fn irradiance(query: &impl Answers, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<Vec3> {
     points.par_iter().zip(masks).map(|(point, &mask)| query.irradiance(&point.query, mode.visibility(mask))).collect()
 }
 
 /// Milliseconds for querying and shading all points, one entry per run.
-pub fn time_shading(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<f64> {
+pub fn time_shading(query: &impl Answers, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<f64> {
     let mut radiance = vec![Vec3::ZERO; points.len()];
     (0..RUNS)
         .map(|_| {
@@ -101,7 +100,7 @@ pub fn time_shading(query: &Query, points: &[ImagePoint], masks: &[u8], mode: Vi
 }
 
 /// Nanoseconds of one look-up on one thread, one entry per run; none without points.
-pub fn time_lookup(query: &Query, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<f64> {
+pub fn time_lookup(query: &impl Answers, points: &[ImagePoint], masks: &[u8], mode: VisibilityMode) -> Vec<f64> {
     let step = points.len().div_ceil(LOOKUP_POINTS).max(1);
     let chosen: Vec<_> = points.iter().zip(masks).step_by(step).map(|(p, &mask)| (p.query, mask)).collect();
     let run = |_| {

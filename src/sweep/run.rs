@@ -157,7 +157,7 @@ impl Setting<'_, '_> {
     /// Points of the air, and the truth there. Configurations that cover the same share both.
     fn in_air(&self, query: &Query) -> (Air, Arc<AirTruth>) {
         let world = self.scenery.world;
-        let (low, high) = air::bounds(world, query.volume);
+        let (low, high) = air::bounds(world, &query.volume.grid);
         let key = [low, high].map(|corner| corner.to_array().map(f32::to_bits));
         let mut known = self.truths.0.borrow_mut();
         if let Some((points, truth)) = known.get(&key) {

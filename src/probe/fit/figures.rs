@@ -7,8 +7,7 @@ use serde_json::{Value, json};
 use super::points::{Asked, Kind};
 use super::targets::Target;
 use crate::light::sampled::RayCount;
-use crate::probe::Volume;
-use crate::probe::query::{Query, QuerySettings};
+use crate::probe::query::Answers;
 
 /// What a fit did. RMSE are ÷ the mean irradiance, of all channels, without the noise of the paths; `null` where nothing is
 /// lit.
@@ -72,11 +71,11 @@ pub struct Residuals {
     pub negative: f64,
 }
 
-/// How far the volume's look-ups are from the targets.
-pub fn residuals(query: &QuerySettings, volume: &Volume, asked: &[Asked], targets: &[Target]) -> Residuals {
-    let query = Query { volume, settings: query };
+/// How far look-ups are from the targets.
+pub fn residuals(look_up: &impl Answers, asked: &[Asked], targets: &[Target]) -> Residuals {
     let held: Vec<(&Asked, &Target)> = asked.iter().zip(targets).filter(|(asked, _)| asked.is_held_out).collect();
-    let found: Vec<Vec3> = held.par_iter().map(|(asked, _)| query.irradiance(&asked.query, asked.visibility)).collect();
+    let found: Vec<Vec3> =
+        held.par_iter().map(|(asked, _)| look_up.irradiance(&asked.query, asked.visibility)).collect();
     let of_kind = |kind: Kind| {
         let own = || held.iter().zip(&found).filter(move |((asked, _), _)| asked.kind == kind);
         // Both runs have the same mean and independent noise.

@@ -20,7 +20,7 @@ mod tests;
 
 use std::time::Instant;
 
-use glam::Vec3A;
+use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
 
 pub use self::figures::FitFigures;
@@ -29,10 +29,44 @@ use self::rows::{Row, Rows};
 pub use self::settings::{Fit, RowSettings};
 use crate::light::World;
 use crate::probe::Volume;
-use crate::probe::query::QuerySettings;
+use crate::probe::query::{Answers, Query, QuerySettings};
 
-/// Fits the volume's irradiance, which the prior is too: unknowns that no row asks for keep their values. `None` where the
-/// settings ask for no fit. `advance` is called with the steps done of [`steps`].
+/// Times that unknowns below 0 are held there and the others solved for again, where none may be negative.
+pub const ROUNDS: u32 = 3;
+
+/// A look-up whose values are fitted. They are the prior too: unknowns that no row asks for keep their values.
+pub trait Fitted: Sync {
+    fn look_up(&self) -> impl Answers;
+
+    /// The row of a point.
+    fn row(&self, asked: &Asked, target: Vec3) -> Row;
+
+    /// Fits the values to rows. Returns the iterations of the solver.
+    fn solve(&mut self, rows: Vec<Row>, settings: &RowSettings) -> u32;
+}
+
+/// A volume by the weights of its own method.
+struct OfVolume<'a> {
+    volume: &'a mut Volume,
+    settings: &'a QuerySettings,
+}
+
+impl Fitted for OfVolume<'_> {
+    fn look_up(&self) -> impl Answers {
+        Query { volume: self.volume, settings: self.settings }
+    }
+
+    fn row(&self, asked: &Asked, target: Vec3) -> Row {
+        Row::of(self.settings, self.volume, asked, target)
+    }
+
+    fn solve(&mut self, rows: Vec<Row>, settings: &RowSettings) -> u32 {
+        fit_rows(self.volume, rows.into_iter(), settings)
+    }
+}
+
+/// Fits the volume's irradiance. `None` where the settings ask for no fit. `advance` is called with the steps done of
+/// [`steps`].
 pub fn run(
     fit: &Fit,
     world: &World,
@@ -42,20 +76,31 @@ pub fn run(
     advance: impl Fn(u64) + Sync,
 ) -> Option<FitFigures> {
     let Fit::Rows(settings) = fit else { return None };
+    Some(run_on(&mut OfVolume { volume, settings: query }, settings, world, seed, advance))
+}
+
+/// Fits what a look-up reads, whoever's it is.
+pub fn run_on(
+    fitted: &mut impl Fitted,
+    settings: &RowSettings,
+    world: &World,
+    seed: u64,
+    advance: impl Fn(u64) + Sync,
+) -> FitFigures {
     let started = Instant::now();
-    let asked = points::all(world, query, volume, settings);
+    let asked = points::all(world, &fitted.look_up(), settings);
     let (targets, rays, non_finite) = targets::trace(world, &asked, settings, seed, &advance);
-    let before = figures::residuals(query, volume, &asked, &targets);
+    let before = figures::residuals(&fitted.look_up(), &asked, &targets);
     let lit = targets::without_brightest(&asked, &targets);
     let counts = |i: usize| asked[i].is_fitted && !asked[i].is_held_out && lit[i];
-    let fitted: Vec<usize> = (0..asked.len()).filter(|&i| counts(i)).collect();
-    let row = |&i: &usize| Row::of(query, volume, &asked[i], targets[i].mean());
-    let rows: Vec<Row> = fitted.par_iter().map(row).collect();
-    let iterations = fit_rows(volume, rows.into_iter(), settings);
-    let after = figures::residuals(query, volume, &asked, &targets);
+    let chosen: Vec<usize> = (0..asked.len()).filter(|&i| counts(i)).collect();
+    let row = |&i: &usize| fitted.row(&asked[i], targets[i].mean());
+    let rows: Vec<Row> = chosen.par_iter().map(row).collect();
+    let iterations = fitted.solve(rows, settings);
+    let after = figures::residuals(&fitted.look_up(), &asked, &targets);
     let count = |of: fn(&Asked) -> bool| asked.iter().filter(|a| of(a)).count();
-    Some(FitFigures {
-        rows: fitted.len(),
+    FitFigures {
+        rows: chosen.len(),
         rows_held_out: count(|a| a.is_held_out),
         rows_dropped: count(|a| !a.is_fitted),
         paths: settings.paths,
@@ -68,13 +113,11 @@ pub fn run(
         non_finite,
         rays,
         time_s: started.elapsed().as_secs_f64(),
-    })
+    }
 }
 
 /// Fits a volume to rows. Returns the iterations of the solver.
 pub fn fit_rows(volume: &mut Volume, rows: impl Iterator<Item = Row>, settings: &RowSettings) -> u32 {
-    /// Times that unknowns below 0 are held there and the others solved for again.
-    const ROUNDS: u32 = 3;
     let factors = volume.irradiance.factors();
     let unknowns = volume.irradiance.fitted_unknowns();
     let rows = Rows::new(&factors, volume.states.len(), unknowns, rows);

@@ -10,9 +10,9 @@ use crate::light::sides::{Place, Sides};
 use crate::light::surface::SurfacePoint;
 use crate::math::random::{KroneckerSequence, Purpose, Random};
 use crate::math::sampling::{cosine_hemisphere, uniform_sphere};
-use crate::probe::Volume;
+use crate::probe::lattice::ProbeIndex;
 use crate::probe::place::air;
-use crate::probe::query::{CornerWeights, Query, QueryPoint, QuerySettings, Visibility};
+use crate::probe::query::{Answers, CornerWeights, QueryPoint, Visibility};
 use crate::probe::store::surface::Facing;
 use crate::trace::Ray;
 
@@ -61,9 +61,9 @@ const ROUNDS: usize = 4;
 /// How far beyond the probes' hull surfaces ask for light that the fit sees to, spacings: walls around a grid within a room.
 const BEYOND: f32 = 1.0;
 
-struct Task<'a, 's> {
+struct Task<'a, 's, A> {
     world: &'a World<'s>,
-    query: Query<'a>,
+    look_up: &'a A,
     contacts: Contacts,
     /// Surfaces within it are fitted to.
     hull: (Vec3, Vec3),
@@ -71,17 +71,18 @@ struct Task<'a, 's> {
 
 /// All points, by kind. They do not depend on the seed, like the grid and the survey: between two bakes that differ by chance
 /// only the light differs that arrives at them.
-pub fn all(world: &World, query: &QuerySettings, volume: &Volume, settings: &RowSettings) -> Vec<Asked> {
-    let contacts = Contacts::of_points(world.scene, &volume.positions);
-    let task = Task { world, query: Query { volume, settings: query }, contacts, hull: volume.grid.hull(BEYOND) };
-    let [surface, bent, air] = settings.points(volume.active_count());
+pub fn all(world: &World, look_up: &impl Answers, settings: &RowSettings) -> Vec<Asked> {
+    let contacts = Contacts::of_points(world.scene, look_up.positions());
+    let task = Task { world, look_up, contacts, hull: look_up.grid().hull(BEYOND) };
+    let active = (0..look_up.positions().len() as u32).filter(|&probe| look_up.is_active(ProbeIndex(probe)));
+    let [surface, bent, air] = settings.points(active.count());
     let mut asked = task.on_surfaces(Kind::Surface, surface, 1.0);
     asked.extend(task.on_surfaces(Kind::Bent, bent, settings.bent));
     asked.extend(task.in_air(air, settings.air));
     asked
 }
 
-impl Task<'_, '_> {
+impl<A: Answers> Task<'_, '_, A> {
     /// Points uniform by area on the sides of triangles that the scene shades: both of double-sided ones.
     fn on_surfaces(&self, kind: Kind, count: usize, weight: f32) -> Vec<Asked> {
         let Some(sides) = Sides::of(self.world.scene) else { return Vec::new() };
@@ -107,9 +108,8 @@ impl Task<'_, '_> {
 
     /// The point of a place; `None` where nothing is shaded, or no probe is in sight.
     fn on_surface(&self, kind: Kind, place: &Place, weight: f32, random: &mut Random) -> Option<Asked> {
-        let world = self.world;
+        let (world, look_up) = (self.world, self.look_up);
         let surface = world.point_at(place);
-        let volume = self.query.volume;
         let (low, high) = self.hull;
         let is_within = surface.position.cmpge(low).all() && surface.position.cmple(high).all();
         if !is_within || !world.is_seen(place, &surface, || random.bits()) {
@@ -133,44 +133,47 @@ impl Task<'_, '_> {
         let facet = Facet { position: surface.position, normal: geometric, offset: surface.ray_offset };
         let salt = random.bits();
         let sees = |probe: usize| {
-            let line = sight_line(&facet, volume.positions[probe], self.contacts.of(probe));
+            let line = sight_line(&facet, look_up.positions()[probe], self.contacts.of(probe));
             line.is_some_and(|(origin, target)| !world.tracer.occluded(Ray::segment(origin, target, salt)))
         };
-        let weights = self.query.weights(&query, Visibility::Stored);
+        let weights = look_up.weights(&query, Visibility::Stored);
         let hidden = hidden_share(&weights, sees);
         // Where what is stored shows none, any of the eight may be in sight all the same.
         let is_seen = || {
-            let corners = volume.grid.corners_around(&self.query.cell(&query));
-            corners.into_iter().any(|probe| volume.is_active(probe) && sees(probe.0 as usize))
+            let corners = look_up.corners(&query);
+            corners.into_iter().any(|probe| look_up.is_active(probe) && sees(probe.0 as usize))
         };
         if hidden.is_none_or(|hidden| hidden >= 1.0) && !is_seen() {
             return None;
         }
-        let is_fitted = hidden.is_some_and(|hidden| hidden <= MOST_HIDDEN);
+        // A look-up that knows no walls is fitted through them too.
+        let most = if look_up.knows_walls() { MOST_HIDDEN } else { 1.0 };
+        let is_fitted = hidden.is_some_and(|hidden| hidden <= most);
         let visibility = Visibility::Stored;
         Some(Asked { kind, surface, query, visibility, weight, is_fitted, is_held_out: false })
     }
 
     /// Points of the air that see a probe, which ask by what they see. Inside of solids no probe is in sight.
     fn in_air(&self, count: usize, weight: f32) -> Vec<Asked> {
-        let (world, volume) = (self.world, self.query.volume);
-        let (low, high) = air::bounds(world, &volume.grid);
+        let (world, look_up) = (self.world, self.look_up);
+        let (low, high) = air::bounds(world, look_up.grid());
         let at = |index: usize| {
             let mut random = Random::new(0, Purpose::FitPoints, Kind::Air as u64, 1 + index as u64);
             let share = Vec3::new(random.uniform(), random.uniform(), random.uniform());
             let position = low + (high - low) * share;
             let normal = uniform_sphere(Vec2::new(random.uniform(), random.uniform()));
             let query = QueryPoint { position, normal, geometric: normal, facing: Facing::of(normal), view: normal };
-            let corners = volume.grid.corners_around(&self.query.cell(&query));
+            let corners = look_up.corners(&query);
             let salt = random.bits();
             let mask = corners.into_iter().enumerate().fold(0u8, |mask, (i, probe)| {
                 let contact = self.contacts.of(probe.0 as usize);
-                let target = contact.map_or(volume.position(probe), |contact| contact.target(position));
+                let target = contact.map_or(look_up.positions()[probe.0 as usize], |contact| contact.target(position));
                 let sees = || !world.tracer.occluded(Ray::segment(position, target, salt));
-                mask | u8::from(volume.is_active(probe) && sees()) << i
+                mask | u8::from(look_up.is_active(probe) && sees()) << i
             });
             let visibility = Visibility::Exact(mask);
-            let asks = self.query.weights(&query, visibility).total() > 0.0;
+            let asks = look_up.weights(&query, visibility).total() > 0.0;
+            let visibility = if look_up.knows_walls() { visibility } else { Visibility::Stored };
             let surface = SurfacePoint::in_space(position, normal);
             let kind = Kind::Air;
             asks.then_some(Asked { kind, surface, query, visibility, weight, is_fitted: true, is_held_out: false })

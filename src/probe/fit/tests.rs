@@ -294,7 +294,7 @@ fn rows_that_ask_through_walls_are_dropped() {
     let world = World::new(&scene, 1.0, 0.999).unwrap();
     let volume = over(&scene, 1.0, &harmonics(None, false));
     let settings = RowSettings { rows_per_probe: 8, ..RowSettings::default() };
-    let asked = points::all(&world, &untested(), &volume, &settings);
+    let asked = points::all(&world, &Query { volume: &volume, settings: &untested() }, &settings);
     let query = Query { volume: &volume, settings: &untested() };
     // A wall stands at x = 0, 0.1 m thick.
     let across = |asked: &Asked| {

@@ -7,6 +7,7 @@
 //! 3. the floor, the crush and the trilinear weight; nothing where all eight are below `blank_below`;
 //! 4. the weighted mean of the probes' irradiance around the normal, or towards where the light comes from.
 
+mod answers;
 mod corner_test;
 mod look_up;
 mod point;
@@ -14,6 +15,7 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
+pub use self::answers::Answers;
 pub use self::look_up::{Query, trilinear};
 pub use self::point::{CornerWeights, Part, QueryPoint, Visibility};
 pub use self::settings::{BiasSpacing, Blend, DirectionWeight, LookUp, QuerySettings, VisibilityTest, WeightNormal};

@@ -15,6 +15,8 @@ enum Kind<'i> {
     Maps { maps: &'i OctahedralMaps<Vec3A>, interior: Vec<u32> },
     /// Functions ÷ Y₀, and with a gradient the way from the probe.
     Functions { gradient: bool },
+    /// Faces of a cube by the squares of the direction's components.
+    Faces,
     /// Functions at the four texels of a map that shading reads.
     Presampled { maps: &'i OctahedralMaps<Vec3A>, functions: Vec<Functions> },
 }
@@ -36,6 +38,17 @@ impl<'i> Factors<'i> {
         })
     }
 
+    /// Of coefficients that are evaluated, times Y₀, without a gradient.
+    pub fn of_functions() -> Factors<'static> {
+        Factors(Kind::Functions { gradient: false })
+    }
+
+    /// Of irradiance along +x, −x, +y, −y, +z, −z: an ambient cube, whose face along each axis counts with the square of the
+    /// direction's component (Mitchell, *Shading in Valve's Source Engine*, 2006).
+    pub fn of_faces() -> Factors<'static> {
+        Factors(Kind::Faces)
+    }
+
     /// Calls `add(unknown, factor)` for all unknowns that count around `oct`, for a point that is `offset` from the probe, in
     /// its spacings. Irradiance is their sum where the store is linear.
     #[inline]
@@ -55,6 +68,13 @@ impl<'i> Factors<'i> {
                     (0..3).for_each(|axis| add(COUNT + axis, offset[axis]));
                 }
             }
+            Kind::Faces => {
+                let direction = direction_from_oct(oct);
+                for axis in 0..3 {
+                    let cosine = direction[axis];
+                    add(2 * axis + usize::from(cosine < 0.0), cosine * cosine);
+                }
+            }
             Kind::Presampled { maps, functions } => {
                 let taps = maps.taps(oct);
                 for unknown in 0..COUNT {
@@ -68,7 +88,7 @@ impl<'i> Factors<'i> {
     /// How many squares of a difference of unknowns, W·m⁻², a squared difference of what the file holds is.
     pub fn stiffness(&self) -> f64 {
         match self.0 {
-            Kind::Maps { .. } => 1.0,
+            Kind::Maps { .. } | Kind::Faces => 1.0,
             Kind::Functions { .. } | Kind::Presampled { .. } => f64::from(Y0).powi(-2),
         }
     }

@@ -122,7 +122,8 @@ pub fn fit_rows(volume: &mut Volume, rows: impl Iterator<Item = Row>, settings: 
     let unknowns = volume.irradiance.fitted_unknowns();
     let rows = Rows::new(&factors, volume.states.len(), unknowns, rows);
     let prior: Vec<Vec3A> = (0..volume.states.len()).flat_map(|p| volume.irradiance.fitted(p)).collect();
-    let lambda = f64::from(settings.lambda) * factors.stiffness();
+    let stiffness = |unknown: usize| f64::from(settings.lambda) * factors.stiffness(unknown);
+    let lambda = (0..prior.len()).map(|i| stiffness(i % unknowns)).collect();
     let task = solve::Task { rows: &rows, prior: &prior, lambda, iterations: settings.iterations };
     // Irradiance is nowhere negative; coefficients have signs.
     let bounded = volume.irradiance.signed().is_none();

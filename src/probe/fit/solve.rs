@@ -1,4 +1,4 @@
-//! Least squares with a prior: `min Σ ω_k (A_k·x − E_k)² + λ|x − x₀|²`, per channel, by conjugate gradients on the normal
+//! Least squares with a prior: `min Σ ω_k (A_k·x − E_k)² + Σ λ_i·(x_i − x₀_i)²`, per channel, by conjugate gradients on the normal
 //! equations with their diagonal as preconditioner (Hestenes & Stiefel 1952).
 
 use glam::{DVec3, Vec3A};
@@ -11,7 +11,8 @@ pub struct Task<'a, 'f, 'i> {
     pub rows: &'a Rows<'f, 'i>,
     /// x₀.
     pub prior: &'a [Vec3A],
-    pub lambda: f64,
+    /// λ of each unknown.
+    pub lambda: Vec<f64>,
     /// Most iterations of one solution.
     pub iterations: u32,
 }
@@ -78,14 +79,14 @@ impl Task<'_, '_, '_> {
         beyond: &mut [DVec3],
     ) -> u32 {
         let rows = self.rows;
-        let steepness: Vec<f64> = diagonal.iter().map(|d| 1.0 / (d + self.lambda)).collect();
+        let steepness: Vec<f64> = diagonal.iter().zip(&self.lambda).map(|(d, lambda)| 1.0 / (d + lambda)).collect();
         let x: Vec<DVec3> = prior.iter().zip(beyond.iter()).map(|(a, b)| *a + *b).collect();
         let mut missing = rows.times(&x);
         missing.iter_mut().zip(rows.targets()).for_each(|(m, target)| *m = target.as_dvec3() - *m);
         let mut gradient = rows.transposed_times(&missing);
         let columns = || 0..gradient_len(free);
         for i in columns() {
-            gradient[i] = (gradient[i] - beyond[i] * self.lambda) * free[i];
+            gradient[i] = (gradient[i] - beyond[i] * self.lambda[i]) * free[i];
         }
         let precondition = |g: &[DVec3]| -> Vec<DVec3> { g.iter().zip(&steepness).map(|(g, s)| *g * *s).collect() };
         let mut step = precondition(&gradient);
@@ -98,7 +99,7 @@ impl Task<'_, '_, '_> {
                 None => rows.transposed_times(&rows.times(&step)),
             };
             for i in columns() {
-                image[i] = (image[i] + step[i] * self.lambda) * free[i];
+                image[i] = (image[i] + step[i] * self.lambda[i]) * free[i];
             }
             let length = ratio(slope, dot(&step, &image));
             for i in columns() {

@@ -222,12 +222,13 @@ fn conjugate_gradients_reach_the_dense_solution() {
     let volume = volume(&octahedral(2));
     let rows = rows_of(&volume, 400, |x, n| Vec3::new(1.0 + n.z, x.x.sin(), 3.0 * n.y * x.z));
     let factors = volume.irradiance.factors();
-    let (unknowns, lambda) = (27 * 4, 0.3);
+    let unknowns = 27 * 4;
+    let lambda: Vec<f64> = (0..unknowns).map(|i| 0.1 * (1 + i % 4) as f64).collect();
     let rows = Rows::new(&factors, 27, 4, rows.into_iter());
     let prior = vec![Vec3A::new(0.5, 1.0, -1.0); unknowns];
-    let task = solve::Task { rows: &rows, prior: &prior, lambda, iterations: 400 };
+    let task = solve::Task { rows: &rows, prior: &prior, lambda: lambda.clone(), iterations: 400 };
     let solved = task.solve(0);
-    let mut matrix = DMatrix::<f64>::identity(unknowns, unknowns) * lambda;
+    let mut matrix = DMatrix::from_diagonal(&DVector::from_column_slice(&lambda));
     let mut right = vec![DVector::<f64>::from_element(unknowns, 0.0); 3];
     for column in 0..unknowns {
         let unit: Vec<DVec3> = (0..unknowns).map(|o| if o == column { DVec3::ONE } else { DVec3::ZERO }).collect();
@@ -236,7 +237,7 @@ fn conjugate_gradients_reach_the_dense_solution() {
     }
     let targets: Vec<DVec3> = rows.targets().iter().map(|t| t.as_dvec3()).collect();
     for (i, value) in rows.transposed_times(&targets).iter().enumerate() {
-        (0..3).for_each(|c| right[c][i] = value[c] + lambda * f64::from(prior[i][c]));
+        (0..3).for_each(|c| right[c][i] = value[c] + lambda[i] * f64::from(prior[i][c]));
     }
     // Texels beyond the border of a map are texels of its far side: such factors are squared before they are added up.
     for (i, diagonal) in rows.diagonal().into_iter().enumerate() {

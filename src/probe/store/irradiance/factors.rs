@@ -85,11 +85,18 @@ impl<'i> Factors<'i> {
         }
     }
 
-    /// How many squares of a difference of unknowns, W·m⁻², a squared difference of what the file holds is.
-    pub fn stiffness(&self) -> f64 {
+    /// How firmly a fit holds an unknown to its prior: how many squares of a difference of unknowns, W·m⁻², a squared difference
+    /// of what the file holds is, and more for directions.
+    pub fn stiffness(&self, unknown: usize) -> f64 {
+        /// Surfaces ask around few directions, and leave the others to noise. From 1 to 10 errors in pictures of seven scenes
+        /// change by 1 % at most (thin_wall 5), those of their air fall by 1 to 8 %; 100 costs up to a tenth of the former.
+        const OF_DIRECTIONS: f64 = 10.0;
         match self.0 {
             Kind::Maps { .. } | Kind::Faces => 1.0,
-            Kind::Functions { .. } | Kind::Presampled { .. } => f64::from(Y0).powi(-2),
+            Kind::Functions { .. } | Kind::Presampled { .. } => {
+                let is_direction = (1..COUNT).contains(&unknown);
+                f64::from(Y0).powi(-2) * if is_direction { OF_DIRECTIONS } else { 1.0 }
+            }
         }
     }
 }

@@ -166,6 +166,7 @@ impl Tree {
             let taken = format!("{path}.{name}");
             if self.at(&taken).is_some_and(Value::is_object)
                 && let Some(parts) = if settings.is_empty() { None } else { below(&taken, settings) }
+                && !self.is_whole(&taken, &parts)
             {
                 return parts.into_iter().try_for_each(|p| self.apply(&part(p), waiting));
             }

@@ -64,7 +64,7 @@ python3 - "$work" "$runs" "${names[@]}" <<'PY'
 import json, statistics, sys
 
 work, runs, names = sys.argv[1], int(sys.argv[2]), sys.argv[3:]
-STAGES = ["load", "accel_build", "survey", "capture", "bounces", "filter", "encode", "write"]
+STAGES = ["load", "accel_build", "survey", "capture", "bounces", "fit", "filter", "encode", "write"]
 
 
 def reports(name, kind):

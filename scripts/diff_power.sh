@@ -8,13 +8,13 @@ only_help "usage: scripts/diff_power.sh
 
 Bakes and renders scenes at a spacing each, fine and far too coarse, with the seeds 0 to 20. Compares twenty candidates with a base that
 differs in its seed only: one other seed, and eight others side by side. Then bakes with the lamps some percent brighter, and looks for
-the least change that is caught in 19 of 20: with one other seed, with eight, and with the same. RUNS='cornell:0.25 office:1' chooses scenes and spacings (m).
-LIGHTPROBE names a binary to use instead of building one." "$@"
+the least change that is caught in 19 of 20: with one other seed, with eight, and with the same. RUNS='cornell:0.25 office:1' chooses scenes and spacings (m),
+PRESET another preset than the default. LIGHTPROBE names a binary to use instead of building one." "$@"
 
 provide_lightprobe
-mkdir -p out/power
+mkdir -p "out/power/${PRESET:-default}"
 
-python3 - "$lightprobe" out/power "${RUNS:-cornell:0.25 two_rooms_open:0.5 two_rooms_open:1 two_rooms_open:2 courtyard:2 office:2}" <<'PYTHON'
+python3 - "$lightprobe" "out/power/${PRESET:-default}" "${RUNS:-cornell:0.25 two_rooms_open:0.5 two_rooms_open:1 two_rooms_open:2 courtyard:2 office:2}" <<'PYTHON'
 import json
 import os
 import shutil
@@ -62,7 +62,7 @@ def make(scene, spacing, percent, seed):
         path = brighter(scene, 1 + percent / 100)
         common = ["-q", "--seed", str(seed)]
         bake = [program, "bake", path, "-o", side / "a.probes", "--report", side / "bake.json"]
-        subprocess.run([*bake, "--set", f"grid.spacing_m={spacing}", *common], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([*bake, "--preset", folder.name, "--set", f"grid.spacing_m={spacing}", *common], check=True, stdout=subprocess.DEVNULL)
         render = [program, "render", path, side / "a.probes", "-o", side / "run", "--camera", "all", "--size", "96x54"]
         subprocess.run([*render, *common], check=True, stdout=subprocess.DEVNULL)
         (side / "done").touch()

@@ -9,7 +9,7 @@ use std::path::Path;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{Vec3, Vec3A};
 use lightprobe::bake::{Baked, Circumstances, prepare};
-use lightprobe::config::Config;
+use lightprobe::config::{Config, Layers};
 use lightprobe::light::World;
 use lightprobe::math::random::Purpose;
 use lightprobe::probe::capture::{Capture, ProbeCapture};
@@ -19,13 +19,15 @@ use lightprobe::probe::store::surface::Facing;
 use lightprobe::probe::transport::operator::Operator;
 use lightprobe::scene::{self, LoadOptions, Scene, TriangleIndex};
 
-/// The methods whose look-ups are compared, by name and the keys in which they differ from the default.
-const METHODS: [(&str, &[&str]); 4] = [
-    ("default", &[]),
-    ("none", &["query.visibility=none"]),
-    ("moments", &["query.visibility=moments(power: 3, floor: 0.05)"]),
+/// The methods whose look-ups are compared: name, preset, and the keys in which they differ from it.
+const METHODS: [(&str, &str, &[&str]); 5] = [
+    ("default", "default", &[]),
+    ("physical", "physical", &[]),
+    ("none", "physical", &["query.visibility=none"]),
+    ("moments", "physical", &["query.visibility=moments(power: 3, floor: 0.05)"]),
     (
         "moments, wrap, crush, roots",
+        "physical",
         &[
             "query.visibility=moments(power: 3, floor: 0.05)",
             "query.direction=wrap(offset: 0.2)",
@@ -45,9 +47,10 @@ fn scene() -> Scene {
     scene::load(&path, &LoadOptions::default()).expect("a scene of the project")
 }
 
-fn config(keys: &[&str]) -> Config {
+fn config(preset: &str, keys: &[&str]) -> Config {
     let keys = ["grid.spacing_m=1", "capture.resolution=16"].iter().chain(keys).map(|key| (*key).to_owned());
-    Config::default().with_overrides(&keys.collect::<Vec<_>>()).expect("keys of the configuration")
+    let layers = Layers::of(Some(preset)).and_then(|layers| layers.set(&keys.collect::<Vec<_>>()));
+    layers.and_then(|layers| layers.config()).expect("keys of the configuration")
 }
 
 fn bake(world: &World, config: &Config) -> Baked {
@@ -81,8 +84,8 @@ fn query(criterion: &mut Criterion) {
     let points = points(&scene);
     let mut group = criterion.benchmark_group("query");
     group.throughput(Throughput::Elements(POINTS as u64));
-    for (name, keys) in METHODS {
-        let config = config(keys);
+    for (name, preset, keys) in METHODS {
+        let config = config(preset, keys);
         let volume = bake(&world, &config).volume;
         let query = Query { volume: &volume, settings: &config.query };
         group.bench_function(name, |bencher| {
@@ -94,7 +97,7 @@ fn query(criterion: &mut Criterion) {
 fn filter_and_bounce(criterion: &mut Criterion) {
     let scene = scene();
     let world = World::new(&scene, 1.0, 0.999).expect("Embree");
-    let config = config(&[]);
+    let config = config("physical", &[]);
     let mut volume = bake(&world, &config).volume;
     let capture = Capture {
         world: &world,

@@ -9,7 +9,7 @@ usage="usage: scripts/readme/methods.sh [--tables]
 Sets up, builds, and sweeps all presets over each scene, in these parts:
 
   positions  the same bounds and spacing for all methods
-  bytes      as many probes as fit into the bytes that the default needs there; wants 'positions' first
+  bytes      as many probes as fit into the bytes that the preset physical needs there; wants 'positions' first
   curves     a ladder of spacings, for error against bake time and against shading time
   mixed      the mixed grid against the uniform one at the same finest spacing
 

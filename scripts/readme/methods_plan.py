@@ -12,7 +12,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 WORK = ROOT / "out" / "methods"
 SHARED = os.environ.get("SHARED", "../shared")
 
-PRESETS = ["default", "fitted", "irradiance-2022", "lightfield-2022", "ddgi-2019", "threev8-uniform", "threev8-mixed"]
+PRESETS = ["physical", "default", "irradiance-2022", "lightfield-2022", "ddgi-2019", "threev8-uniform", "threev8-mixed"]
 # More than 8 KiB a probe: ladders end at the scene's own spacing, beyond which a bake takes hours of a core.
 LARGE = {"irradiance-2022", "lightfield-2022"}
 
@@ -116,13 +116,13 @@ def mixed(scene):
 
 
 def bytes_(scene):
-    """Grids on which every method has about the bytes that the default has at the scene's own spacing."""
+    """Grids on which every method has about the bytes that `physical` has at the scene's own spacing."""
     report = sweep_of(scene, "positions")
     if report is None:
         sys.exit(f"{scene}: there is no out/methods/{scene}/positions/sweep.json; run the part 'positions' first")
     rows = {row["label"].split(",")[0]: row for row in report["configurations"]}
-    budget = typical(rows["default"], "bytes")
-    entries = [ladder(scene, "bytes", "default", "default", at_spacing(spacing_of(scene)))]
+    budget = typical(rows["physical"], "bytes")
+    entries = [ladder(scene, "bytes", "physical", "physical", at_spacing(spacing_of(scene)))]
     for preset in PRESETS[1:]:
         probes = budget / typical(rows[preset], "bytes_per_probe")
         if preset == "threev8-mixed":

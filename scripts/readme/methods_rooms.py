@@ -7,9 +7,10 @@ from methods_tables import markdown, milliseconds, percent, significant, size
 ROOMS = ["two_rooms_sealed", "two_rooms_open"]
 # Luo 2022: memory a probe and shading time on an RTX 2070.
 PUBLISHED = {"irradiance-2022": ("149.25 KiB", "1.1 ms"), "lightfield-2022": ("576 KiB", "1.1 ms")}
-ROOMS_ROWS = ["default", "default.walls", *PRESETS[1:]]
-VISIBILITY = {"irradiance-2022": "none", "lightfield-2022": "Chebyshev³", "default": "table at surfaces"}
-VISIBILITY["default.walls"] = "table at surfaces, grid to the walls"
+ROOMS_ROWS = ["physical", "physical.walls", *PRESETS[1:]]
+VISIBILITY = {"irradiance-2022": "none", "lightfield-2022": "Chebyshev³", "physical": "table at surfaces"}
+VISIBILITY["physical.walls"] = "table at surfaces, grid to the walls"
+VISIBILITY["default"] = VISIBILITY["physical"]
 VISIBILITY |= {"ddgi-2019": "Chebyshev³", "threev8-uniform": "Chebyshev", "threev8-mixed": "Chebyshev"}
 
 
@@ -59,7 +60,7 @@ def rooms_table():
             cells += [percent(row[key]) for key in ("leak", "leak_dark_room", "dark", "outside", "error")]
             lines.append(cells)
         if lines:
-            report, _ = room(scene, "default", "lit")
+            report, _ = room(scene, "physical", "lit")
             count = report["threads"] if report else 0
             threads = "one thread" if count == 1 else f"{count} threads" if count else "one machine"
             blocks.append(f"**{scene}**, 4 × 2 × 2 probes; times of {threads}.\n\n{markdown(head, lines)}")
@@ -83,7 +84,7 @@ def findings(found):
         lines.append(
             f"* No leak with visibility: {verdict(with_ < 0.01 and with_ < without)}. The sealed dark room shows "
             f"{percent(without)} of the lit room's light without visibility and {percent(with_)} with it "
-            f"(`default`: {percent(get(ROOMS[0], 'default', 'dark'))}); the bound for “no leak” here is 1 %."
+            f"(`physical`: {percent(get(ROOMS[0], 'physical', 'dark'))}); the bound for “no leak” here is 1 %."
         )
     times = [get(scene, preset, "shade") for scene in ROOMS for preset in ("irradiance-2022", "lightfield-2022")]
     if all(times):
@@ -97,7 +98,7 @@ def findings(found):
         lines.append(
             f"* Outer faces lit by interpolation: {verdict(faces > 0.01)}. With visibility the outer faces, which are "
             f"black in truth, show {percent(faces)} of the lit room's light (without: "
-            f"{percent(get(ROOMS[0], 'irradiance-2022', 'outside'))}; `default`: "
-            f"{percent(get(ROOMS[0], 'default', 'outside'))})."
+            f"{percent(get(ROOMS[0], 'irradiance-2022', 'outside'))}; `physical`: "
+            f"{percent(get(ROOMS[0], 'physical', 'outside'))})."
         )
     return lines

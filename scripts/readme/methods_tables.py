@@ -89,7 +89,7 @@ def full_table(report, held):
         if held == "bytes":
             cells.append(significant(typical(row, "bytes") / own))
         lines.append(cells)
-    return markdown([*head, "÷ `default`'s"] if held == "bytes" else head, lines)
+    return markdown([*head, "÷ `physical`'s"] if held == "bytes" else head, lines)
 
 
 def full_tables(part, scenes):

@@ -7,6 +7,7 @@ source "$(dirname -- "${BASH_SOURCE[0]}")/../lib.sh"
 only_help "usage: scripts/readme/pictures.sh
 
 Sets up, builds, bakes both two-room scenes and writes scripts/readme/SCENE.CAMERA.{without,with,leak}.png and probes.png.
+Pictures without visibility and leak maps are of the preset physical: the default's values are fitted with visibility.
 LIGHTPROBE names a binary to use instead of building one." "$@"
 
 provide_lightprobe
@@ -18,16 +19,20 @@ declare -A exposure_ev=([lit]=-0.5 [dark]=2)
 
 for scene in two_rooms_sealed two_rooms_open; do
     mkdir -p "$work"
-    "$lightprobe" bake "scenes/$scene.glb" --config "configs/scenes/$scene.ron" -o "$work/$scene.probes" >&2
+    for preset in physical default; do
+        probes=$work/$scene.$preset.probes
+        "$lightprobe" bake "scenes/$scene.glb" --preset "$preset" --config "configs/scenes/$scene.ron" -o "$probes" >&2
+        for camera in lit dark; do
+            "$lightprobe" render "scenes/$scene.glb" "$probes" -o "$work/$scene.$camera.$preset" \
+                --camera "$camera" --size 480x270 --exposure "${exposure_ev[$camera]}" >&2
+        done
+    done
     for camera in lit dark; do
-        folder=$work/$scene.$camera
-        "$lightprobe" render "scenes/$scene.glb" "$work/$scene.probes" -o "$folder" \
-            --camera "$camera" --size 480x270 --exposure "${exposure_ev[$camera]}" >&2
-        cp -- "$folder/visibility_off.png" "$here/$scene.$camera.without.png"
-        cp -- "$folder/visibility_on.png" "$here/$scene.$camera.with.png"
-        cp -- "$folder/leak.png" "$here/$scene.$camera.leak.png"
+        cp -- "$work/$scene.$camera.physical/visibility_off.png" "$here/$scene.$camera.without.png"
+        cp -- "$work/$scene.$camera.default/visibility_on.png" "$here/$scene.$camera.with.png"
+        cp -- "$work/$scene.$camera.physical/leak.png" "$here/$scene.$camera.leak.png"
     done
 done
-cp -- "$work/two_rooms_open.lit/probes.png" "$here/probes.png"
+cp -- "$work/two_rooms_open.lit.default/probes.png" "$here/probes.png"
 
 du -b -- "$here"/*.png

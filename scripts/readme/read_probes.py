@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Reads a probe file without lightprobe and asks it for irradiance, with the weights of the preset `default`.
+"""Reads a probe file without lightprobe and asks it for irradiance, with the weights of the presets `default` and `physical`.
 
     pip install numpy safetensors
     python3 scripts/readme/read_probes.py FILE.probes X Y Z NX NY NZ
@@ -67,7 +67,7 @@ class Probes:
             else:
                 other.append("test")
         if other:
-            sys.exit(f"this script has the weights of the preset default only; the file differs in {', '.join(other)}")
+            sys.exit(f"this script has the weights of the presets default and physical only; the file differs in {', '.join(other)}")
 
     def unpack_irradiance(self):
         """[P, R', R', 3], in the domain of `encoding.irradiance`, in which maps are filtered."""

@@ -63,7 +63,7 @@ METHODS_HEAD = """# Where the methods' numbers could break
 
 Written by `scripts/stability.sh --readme`; the rows, their bounds and the reasons of these stand in `methods.rs`. Captures are
 scaled down for speed, all else is each preset's own: rays through cube faces of 16² texels (`threev8-*`) or of 32² resampled
-to 16² (`irradiance-2022`, `lightfield-2022`), maps of 16² texels (`default`, `path`), 8 paths from every hit (`path`).
+to 16² (`irradiance-2022`, `lightfield-2022`), maps of 16² texels (`physical`, `path`), 8 paths from every hit (`path`).
 
 `× 10⁻³`, `× 10³`: two rooms of 8 m with a door and a lamp, at that scale against scale 1; the relative difference of the mean
 of a picture. At `× 10³` most distances are beyond 255.9 m, whose square is the largest that f16 holds. Every other row is a

@@ -103,7 +103,7 @@ pub struct ConfigArgs {
     /// Configuration file; only the keys that stand in it count.
     #[arg(long, value_name = "FILE.ron")]
     pub config: Option<PathBuf>,
-    /// Built-in configuration that all else lies over; `list` prints their names.
+    /// Built-in configuration that all else lies over, `default` where none is named; `list` prints their names.
     #[arg(long, value_name = "NAME|list")]
     pub preset: Option<String>,
     /// Override one key of the configuration, for example grid.spacing_m=0.5; may be repeated.
@@ -267,7 +267,7 @@ pub struct SweepArgs {
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
     /// Built-in configuration to compare, may be repeated; `all`: every method, which leaves out `path`, the truth at the
-    /// probes. The default where no --preset, --config nor base in the ladder is given.
+    /// probes. `default` where neither --preset nor a base in the ladder is given; --config then lies over that.
     #[arg(long, value_name = "NAME|all")]
     pub preset: Vec<String>,
     /// Configuration file to compare, may be repeated. With --preset it lies over each of them, as a scene's own does.

@@ -177,12 +177,9 @@ pub fn list_presets(console: &Console) -> Result<()> {
     console.print(&lines.join("\n"))
 }
 
-/// Defaults, then preset, then file, then `--set`, then a constant `--env`, which a probe file so carries to `render`.
+/// The preset, or [`presets::DEFAULT`] where there is none, then file, then `--set`, then a constant `--env`, which a probe file so carries to `render`.
 pub fn resolve_config(args: &ConfigArgs, trace: &TraceArgs) -> Result<Config> {
-    let mut layers = Layers::default();
-    if let Some(name) = &args.preset {
-        layers = layers.preset(name)?;
-    }
+    let mut layers = Layers::of(args.preset.as_deref())?;
     if let Some(path) = &args.config {
         layers = layers.file(path)?;
     }

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::Console;
 use crate::bake::{Baked, Prepared};
 use crate::cli::{ConfigArgs, PictureSize};
+use crate::config::presets;
 use crate::light::sampled::RayCount;
 use crate::plan::{Line, stage_in_words};
 use crate::probe::file::ProbeFile;
@@ -16,7 +17,7 @@ use crate::system::format;
 
 /// Where the configuration in effect comes from.
 pub fn configuration(console: &Console, args: &ConfigArgs) {
-    let preset = format!("preset {}", args.preset.as_deref().unwrap_or("default"));
+    let preset = format!("preset {}", args.preset.as_deref().unwrap_or(presets::DEFAULT));
     let file = args.config.iter().map(|path| path.display().to_string());
     let sets = args.set.iter().map(|set| format!("--set {set}"));
     let text = [preset].into_iter().chain(file).chain(sets).collect::<Vec<_>>().join(", ");

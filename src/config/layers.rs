@@ -19,7 +19,15 @@ pub struct Layers {
 }
 
 impl Layers {
-    /// Layers over a configuration instead of the defaults.
+    /// Layers over the preset of that name, or where none is named over [`presets::DEFAULT`].
+    ///
+    /// # Errors
+    /// There is no such preset.
+    pub fn of(preset: Option<&str>) -> Result<Layers, ConfigError> {
+        Layers::default().preset(preset.unwrap_or(presets::DEFAULT))
+    }
+
+    /// Layers over a configuration instead of [`Config::default`].
     pub fn over(base: Config) -> Layers {
         Layers { base, assignments: Vec::new() }
     }
@@ -99,7 +107,7 @@ impl Layers {
 }
 
 impl Config {
-    /// Reads RON text over the defaults; `place` names it in errors.
+    /// Reads RON text over [`Config::default`]; `place` names it in errors.
     ///
     /// # Errors
     /// The text is not RON, or has keys or values that a configuration does not take.
@@ -158,6 +166,7 @@ impl Tree {
             let taken = format!("{path}.{name}");
             if self.at(&taken).is_some_and(Value::is_object)
                 && let Some(parts) = if settings.is_empty() { None } else { below(&taken, settings) }
+                && !self.is_whole(&taken, &parts)
             {
                 return parts.into_iter().try_for_each(|p| self.apply(&part(p), waiting));
             }
@@ -229,14 +238,9 @@ impl Tree {
     }
 }
 
-/// All keys of a configuration, also those that are left out where they say nothing.
 fn keys_of(config: &Config) -> Value {
     // Plain records of numbers and enums: nothing in them can fail to serialise.
-    let mut tree = serde_json::to_value(config).unwrap_or_default();
-    if let Value::Object(sections) = &mut tree {
-        sections.entry("fit").or_insert_with(|| "none".into());
-    }
-    tree
+    serde_json::to_value(config).unwrap_or_default()
 }
 
 /// What is wrong with a value: RON knows it better where it is about names.

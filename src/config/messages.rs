@@ -19,7 +19,7 @@ const FORMS: &[(&str, &str)] = &[
 /// What is wrong in a configuration file of this text.
 pub fn of_file(error: &SpannedError, text: &str) -> String {
     if text.trim().is_empty() {
-        return "it is empty; write () for the defaults".to_owned();
+        return "it is empty; write () to change nothing".to_owned();
     }
     // The identifier that stands before the place of the error.
     let line = text.lines().nth(error.span.start.line.saturating_sub(1)).unwrap_or("");
@@ -35,7 +35,7 @@ pub fn of_value(error: &ron::Error, value: &str) -> String {
         ron::Error::NoSuchStructField { expected, found, .. } => unknown_key(found, expected.iter().copied()),
         ron::Error::NoSuchEnumVariant { expected, found, .. } => unknown_choice(found, expected),
         ron::Error::ExpectedNamedStructLike("Config") => {
-            "the keys stand in parentheses, as in (grid: (spacing_m: 0.5)); () gives the defaults".to_owned()
+            "the keys stand in parentheses, as in (grid: (spacing_m: 0.5)); () changes nothing".to_owned()
         }
         other => without_parameters(value).unwrap_or_else(|| other.to_string()),
     }

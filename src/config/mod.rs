@@ -1,8 +1,8 @@
 //! The configuration of a bake: where probes stand in a scene, and a method — of the literature, or ours — as a value.
 //!
 //! RON, with every key optional and an unknown key an error. A file is a list of assignments: only the keys that stand in
-//! it count. Layers lie on each other in this order: built-in defaults, `--preset`, `--config`, `--set key=value`
-//! ([`Layers`]). [`Config::default`] is the preset `default`.
+//! it count. Layers lie on each other in this order: the preset `physical`, which has every key and is [`Config::default`];
+//! `--preset`, or where none is named the preset `default`; `--config`; `--set key=value` ([`Layers`]).
 
 mod aliases;
 mod assignments;

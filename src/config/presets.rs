@@ -9,20 +9,26 @@ pub struct Preset {
     pub(super) text: &'static str,
 }
 
+/// The preset of a run that names none.
+pub const DEFAULT: &str = "default";
+
+/// The ground that all presets lie on, with every key: [`Config::default`](super::Config::default).
+pub const PHYSICAL: &str = "physical";
+
 pub const PRESETS: &[Preset] = &[
     Preset {
-        name: "default",
-        summary: "visibility measured at the surfaces, sampled emission, iterated bounces",
+        name: DEFAULT,
+        summary: "where no preset is given: as physical, but with probes fitted to what look-ups ask, for the least error and bytes",
         text: include_str!("../../configs/presets/default.ron"),
     },
     Preset {
-        name: "fitted",
-        summary: "as default, but with probes fitted to what look-ups ask: least error at half the bytes and twice the time",
-        text: include_str!("../../configs/presets/fitted.ron"),
+        name: PHYSICAL,
+        summary: "octahedral maps of the light where the probes stand, visibility measured at the surfaces",
+        text: include_str!("../../configs/presets/physical.ron"),
     },
     Preset {
         name: "path",
-        summary: "as default, but lit by full paths at every hit: the truth at the probes",
+        summary: "as physical, but lit by full paths at every hit: the truth at the probes",
         text: include_str!("../../configs/presets/path.ron"),
     },
     Preset {

@@ -13,6 +13,8 @@ use crate::probe::store::StoreSettings;
 use crate::probe::transport::Transport;
 use crate::scene::Unassigned;
 
+/// All settings of a bake. Its default is the ground that presets lie on, the preset `physical`, and what is meant by a key
+/// that a probe file's configuration leaves out; a run without `--preset` uses [`Layers::of`](super::Layers::of).
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
@@ -23,8 +25,7 @@ pub struct Config {
     pub capture: CaptureSettings,
     pub transport: Transport,
     pub store: StoreSettings,
-    /// Left out where there is none: files and reports without a fit stay as they were before there was one.
-    #[serde(skip_serializing_if = "Fit::is_none")]
+    /// Files and reports of before there were fits have none.
     pub fit: Fit,
     pub query: QuerySettings,
     pub plan: PlanSettings,
@@ -105,11 +106,17 @@ impl PlanSettings {
 }
 
 impl Config {
-    /// The whole configuration as RON that [`Config::parse`] reads back.
+    /// The whole configuration as RON with every key, so that it means the same over any preset.
     pub fn to_ron(&self) -> String {
         let pretty = ron::ser::PrettyConfig::new().indentor("    ").new_line("\n");
         // Plain records of numbers and enums: nothing in them can fail to serialise.
         ron_options().to_string_pretty(self, pretty).unwrap_or_default()
+    }
+
+    /// What tells it from others where results are kept: [`Self::to_ron`], in which a fit that is none is not named, so that
+    /// results of before there were fits stay.
+    pub fn identity(&self) -> String {
+        self.to_ron().replace("\n    fit: none,", "")
     }
 
     /// The same with so many times as many samples of what gives the probes their light: rows of a fit where there is one,

@@ -28,21 +28,30 @@ fn ron_round_trip() {
     }
     let path = preset("path");
     assert_eq!(Config::parse(&path.to_ron(), "itself").unwrap(), path);
+    // A whole file means the same over what a run without a preset begins with, which has a fit where others have none.
+    for one in presets::PRESETS.iter().map(|p| preset(p.name)) {
+        let again = Layers::of(None).unwrap().text(&one.to_ron(), "whole.ron").unwrap().config().unwrap();
+        assert_eq!(again, one);
+    }
+    let named = |config: &Config| [config.to_ron(), config.identity()].map(|text| text.contains("\n    fit: "));
+    assert_eq!((named(&Config::default()), named(&preset("default"))), ([true, false], [true, true]));
 }
 
 #[test]
-fn every_preset_parses_and_default_is_the_default() {
+fn every_preset_parses_and_physical_is_the_ground() {
     for preset in presets::PRESETS {
         super::Layers::default().preset(preset.name).unwrap().config().unwrap();
     }
-    assert_eq!(preset("default"), Config::default());
+    assert_eq!(preset("physical"), Config::default());
+    assert_eq!(Layers::of(None).unwrap().config().unwrap(), preset("default"));
+    assert_ne!(preset("default"), Config::default());
     assert!(Layers::default().preset("defualt").unwrap_err().to_string().contains("default"));
 }
 
 /// A preset says how, a scene's configuration where.
 #[test]
 fn presets_say_nothing_about_a_scene() {
-    for preset in presets::PRESETS.iter().filter(|preset| preset.name != "default") {
+    for preset in presets::PRESETS.iter().filter(|preset| preset.name != presets::PHYSICAL) {
         for assignment in assignments::of_text(preset.text, preset.name).unwrap() {
             let section = assignment.path.split('.').next().unwrap();
             assert!(!["grid", "lights", "materials"].contains(&section), "{}: {}", preset.name, assignment.path);
@@ -231,7 +240,7 @@ fn out_of_range_values_name_key_and_range() {
 #[test]
 fn files_that_say_nothing_and_marks_before_them() {
     assert_eq!(Config::parse("\u{feff}()", "a.ron").unwrap(), Config::default());
-    for (text, words) in [("", "it is empty"), ("\u{feff}\n", "it is empty"), ("// all defaults", "() gives")] {
+    for (text, words) in [("", "it is empty"), ("\u{feff}\n", "it is empty"), ("// nothing", "() changes nothing")] {
         let error = Config::parse(text, "a.ron").unwrap_err().to_string();
         assert!(error.contains(words), "{error}");
     }
@@ -367,8 +376,8 @@ fn stages_that_do_not_go_together_are_refused() {
         ("ddgi-2019", &["store.light_field=maps"], "cube with a resolution"),
         ("lightfield-2022", &["store.light_field=none"], "store.light_field must be maps"),
         ("irradiance-2022", &["store.prefiltered=[128, 32]"], "store.prefiltered"),
-        ("default", &["capture.rays=cube(sharpness: 0)"], "capture.rays.cube.sharpness"),
-        ("default", &["transport=frames(hysteresis: 1)"], "transport.frames.hysteresis"),
+        ("physical", &["capture.rays=cube(sharpness: 0)"], "capture.rays.cube.sharpness"),
+        ("physical", &["transport=frames(hysteresis: 1)"], "transport.frames.hysteresis"),
     ] {
         let error = refused(preset, set);
         assert!(error.contains(words), "{set:?}: {error}");

@@ -35,7 +35,8 @@ pub struct BakedReport {
 }
 
 /// Why there are no figures of probes whose values were fitted.
-pub const FITTED: &str = "the probes hold fitted values, which are not the light where they stand; bake with fit=none";
+pub const FITTED: &str = "the probes hold fitted values, which are not the light where they stand; bake with --set fit=none to \
+                          measure it";
 
 /// Compares `volume` with the path-traced truth at its probes. Returns the figures and their standard errors. Noise of
 /// the truth would raise `light` and `dark`; this is corrected to first order ([`fold`]).

@@ -5,7 +5,7 @@
 //! ```ron
 //! (ladders: [(
 //!     name: "spacing",
-//!     preset: "default",                     // and config: "file.ron"; neither: the methods of the command line
+//!     preset: "physical",                    // and config: "file.ron"; neither: the methods of the command line
 //!     set: ["transport.bounces.max_bounces=8"],
 //!     axes: [(key: "grid.spacing_m", values: [1.0, 0.5]), (key: "query.visibility", values: [none])],
 //! )])
@@ -294,9 +294,8 @@ mod tests {
         assert_eq!(rungs[1].label, "a spacing_m=1.0 visibility=moments(power: 3, floor: 0.05)");
         assert_eq!(rungs[1].config.query.test, VisibilityTest::Chebyshev { power: 3.0, floor: 0.05 });
         assert_eq!(rungs[5].config.grid.spacing_m, Some(0.5));
-        let expected =
-            Config::default().with_overrides(&["solver.tolerance=1e-3".to_owned(), "placement.rays=64".to_owned()]);
-        let expected = expected.unwrap();
+        let set = ["solver.tolerance=1e-3", "placement.rays=64"].map(str::to_owned);
+        let expected = Layers::of(None).unwrap().set(&set).unwrap().config().unwrap();
         assert!(rungs.iter().all(|rung| rung.config.transport == expected.transport));
         assert!(rungs.iter().all(|rung| rung.config.placement == expected.placement));
         assert!(matches!(ladders[1].rungs[0].config.transport, Transport::Paths { .. }));

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::config::{Config, ConfigError, Layers};
+use crate::config::{Config, ConfigError, Layers, presets};
 
 /// What ladders start from.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,19 +14,14 @@ pub struct Method {
 }
 
 impl Method {
-    /// A preset, and files over it; without a preset over the defaults. Both name it.
+    /// A preset, and files over it; without a preset over [`presets::DEFAULT`]. Both name it.
     ///
     /// # Errors
     /// There is no such preset; a file cannot be read.
     pub fn new(preset: Option<&str>, files: &[PathBuf]) -> Result<Method, ConfigError> {
-        let mut layers = Layers::default();
-        let mut published = None;
+        let mut layers = Layers::of(preset)?;
+        let published = preset.map(|_| layers.config()).transpose()?;
         let mut names = Vec::new();
-        if let Some(name) = preset {
-            layers = layers.preset(name)?;
-            published = Some(layers.config()?);
-            names.push(name.to_owned());
-        }
         for path in files {
             layers = layers.file(path)?;
             let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
@@ -35,7 +30,7 @@ impl Method {
         // What is held alike by all is no part of a method's name.
         let name = match preset {
             Some(preset) => preset.to_owned(),
-            None if names.is_empty() => "default".to_owned(),
+            None if names.is_empty() => presets::DEFAULT.to_owned(),
             None => names.join(", "),
         };
         Ok(Method { name, layers, preset: published })

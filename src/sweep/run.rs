@@ -54,7 +54,7 @@ pub struct Finished {
 
 impl Setting<'_, '_> {
     fn key(&self, kind: &str, config: &Config, seed: u64) -> Key {
-        Key::of(&[kind, &self.identity, &config.to_ron(), &seed.to_string()])
+        Key::of(&[kind, &self.identity, &config.identity(), &seed.to_string()])
     }
 
     fn pixels(&self) -> usize {

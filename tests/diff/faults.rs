@@ -14,12 +14,26 @@ use crate::program::scene;
 
 const ROOMS: &str = "--set grid.spacing_m=1";
 
+/// The same by the preset physical: maps, whose values all bounces make.
+const PHYSICAL: &str = "--preset physical --set grid.spacing_m=1";
+
+type Once = OnceLock<(Folder, Made)>;
+
 /// Made once: the rooms as they are.
 fn rooms() -> &'static (Folder, Made) {
-    static ROOMS_MADE: OnceLock<(Folder, Made)> = OnceLock::new();
-    ROOMS_MADE.get_or_init(|| {
+    static MADE: Once = Once::new();
+    made_once(&MADE, ROOMS)
+}
+
+fn physical_rooms() -> &'static (Folder, Made) {
+    static MADE: Once = Once::new();
+    made_once(&MADE, PHYSICAL)
+}
+
+fn made_once(made: &'static Once, words: &str) -> &'static (Folder, Made) {
+    made.get_or_init(|| {
         let folder = Folder::new();
-        let made = make(&folder, "base", &scene("two_rooms_open"), ROOMS);
+        let made = make(&folder, "base", &scene("two_rooms_open"), words);
         (folder, made)
     })
 }
@@ -45,9 +59,12 @@ fn passes(folder: &Folder, base: &Path, candidate: &Path, words: &[&str]) {
 
 /// All three results of a bake, against those of another with this flag.
 fn bake_fault(words: &str, gates: [&str; 3]) {
+    fault_of(&rooms().1, &format!("{ROOMS} {words}"), gates);
+}
+
+fn fault_of(base: &Made, words: &str, gates: [&str; 3]) {
     let folder = Folder::new();
-    let (_, base) = rooms();
-    let fault = make(&folder, "fault", &scene("two_rooms_open"), &format!("{ROOMS} {words}"));
+    let fault = make(&folder, "fault", &scene("two_rooms_open"), words);
     caught(&folder, &base.run, &fault.run, &[], gates[0]);
     caught(&folder, &base.probes, &fault.probes, &[], gates[1]);
     caught(&folder, &base.report, &fault.report, &[], gates[2]);
@@ -105,14 +122,14 @@ fn visibility_off_in_spite_of_noise() {
 
 #[test]
 fn border_dropped() {
-    bake_fault("--set encoding.border=0", ["probes.border"; 3]);
+    fault_of(&physical_rooms().1, &format!("{PHYSICAL} --set encoding.border=0"), ["probes.border"; 3]);
 }
 
 #[test]
 fn coarser_encoding() {
     let folder = Folder::new();
-    let (_, coarse) = rooms();
-    let fine = make(&folder, "f16", &scene("two_rooms_open"), &format!("{ROOMS} --set encoding.irradiance=f16"));
+    let (_, coarse) = physical_rooms();
+    let fine = make(&folder, "f16", &scene("two_rooms_open"), &format!("{PHYSICAL} --set encoding.irradiance=f16"));
     caught(&folder, &fine.run, &coarse.run, &[], "probes.precision");
     caught(&folder, &fine.probes, &coarse.probes, &[], "probes.precision");
     caught(&folder, &fine.report, &coarse.report, &[], "probes.precision");
@@ -124,7 +141,8 @@ fn coarser_encoding() {
 fn one_bounce_less() {
     let folder = Folder::new();
     let bounces = |n: u32| {
-        let words = format!("{ROOMS} --set solver.max_bounces={n}");
+        // Rows of a fit have all bounces, whatever the probes had before it.
+        let words = format!("{PHYSICAL} --set solver.max_bounces={n}");
         make(&folder, &format!("b{n}"), &scene("two_rooms_open"), &words)
     };
     let (three, two) = (bounces(3), bounces(2));
@@ -138,7 +156,7 @@ fn bias_doubled() {
     let folder = Folder::new();
     let biased = |bias: f32| {
         let words =
-            format!("{ROOMS} --set query.visibility=moments(power:3,floor:0.05) --set query.normal_bias={bias}");
+            format!("{PHYSICAL} --set query.visibility=moments(power:3,floor:0.05) --set query.normal_bias={bias}");
         make(&folder, &format!("bias{bias}"), &scene("two_rooms_open"), &words)
     };
     let (once, twice) = (biased(0.05), biased(0.1));
@@ -196,7 +214,7 @@ fn scene_fault(folder: &Folder, base: &Made, fault: &Made, [pictures, probes]: [
 }
 
 /// 512 probes, of which most are active.
-const OF_512: &str = "--set grid.divisions=(8,8,8) --set encoding.irradiance=f32";
+const OF_512: &str = "--preset physical --set grid.divisions=(8,8,8) --set encoding.irradiance=f32";
 
 /// A copy of a file of [`OF_512`] in which one probe is four times as bright, and that probe.
 fn with_bright_probe(folder: &Folder, made: &Made) -> (PathBuf, usize) {

@@ -17,7 +17,8 @@ use crate::program::{bake, scene, text};
 
 pub fn safetensors_opens_a_probe_file() {
     let folder = Folder::new();
-    let baked = bake(&folder, &scene("furnace"), "--set grid.spacing_m=1 --set encoding.irradiance=f32");
+    let baked =
+        bake(&folder, &scene("furnace"), "--preset physical --set grid.spacing_m=1 --set encoding.irradiance=f32");
     let script = "import sys; from safetensors.numpy import load_file; t = load_file(sys.argv[1]); \
                   print(sorted((k, list(v.shape), float(v.astype('float64').sum())) for k, v in t.items()))";
     let output = Command::new("python3").args(["-c", script, text(&baked.path)]).output().unwrap();
@@ -56,17 +57,19 @@ fn points(scene: &Scene, count: u32) -> Vec<Asked> {
 }
 
 /// Harmonics with gradients.
-const FITTED: &str = "--set grid.spacing_m=2 --set store.irradiance=sh9(format:f16,gradient:true) \
-                      --set fit=rows(rows_per_probe:20,paths:4)";
+const FITTED: &str = "--set grid.spacing_m=2 --set fit=rows(rows_per_probe:20,paths:4)";
 
 /// `scripts/readme/read_probes.py`, which is README's description of the look-up as a program, and the tool's own look-up:
 /// the same at 10,000 points.
 pub fn the_script_of_the_readme_asks_as_the_tool_does() {
     let cases = [
-        ("two_rooms_sealed", "--set grid.spacing_m=1"),
-        ("thin_wall", "--set grid.spacing_m=0.75 --set encoding.irradiance=f16"),
-        ("cornell", "--set grid.divisions=(5,1,4) --set grid.bounds=(min:(-0.4,0.3,-0.4),max:(0.4,0.3,0.4))"),
-        ("two_rooms_open", "--set grid.spacing_m=1 --set query.test=table(reach_voxels:1,strip:0.5)"),
+        ("two_rooms_sealed", "--preset physical --set grid.spacing_m=1"),
+        ("thin_wall", "--preset physical --set grid.spacing_m=0.75 --set encoding.irradiance=f16"),
+        (
+            "cornell",
+            "--preset physical --set grid.divisions=(5,1,4) --set grid.bounds=(min:(-0.4,0.3,-0.4),max:(0.4,0.3,0.4))",
+        ),
+        ("two_rooms_open", "--preset physical --set grid.spacing_m=1 --set query.test=table(reach_voxels:1,strip:0.5)"),
         ("two_rooms_open", FITTED),
     ];
     let folder = Folder::new();

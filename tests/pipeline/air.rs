@@ -9,7 +9,7 @@ use lightprobe::shade::air::{Air, POINTS};
 use serde_json::Value;
 
 use crate::common::Folder;
-use crate::program::{bake, method, render, scene};
+use crate::program::{bake, bake_physical, method, render, scene};
 
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
@@ -20,8 +20,7 @@ fn number(value: &Value) -> f64 {
 fn the_air_of_a_furnace_is_evenly_lit() {
     let folder = Folder::new();
     // Objects in the air want the probes of the corners too, which surfaces can do without.
-    let format =
-        "--set store.irradiance.octahedral.format=f32 --set grid.spacing_m=0.5 --set placement.keep_unsampled=true";
+    let format = "--preset physical --set store.irradiance.octahedral.format=f32 --set grid.spacing_m=0.5 --set placement.keep_unsampled=true";
     let baked = bake(&folder, &scene("furnace"), format);
     let report = render(&folder, &scene("furnace"), &baked.path, "run", "--size 16x9 --reference 64");
     for name in ["visibility_off", "visibility_on", "visibility_ray"] {
@@ -80,7 +79,7 @@ fn points_lie_in_the_rooms_and_see_the_probes_of_their_own() {
 #[test]
 fn light_leaks_into_the_air_without_visibility() {
     let folder = Folder::new();
-    let baked = bake(&folder, &scene("two_rooms_open"), "--set grid.spacing_m=1");
+    let baked = bake_physical(&folder, &scene("two_rooms_open"), "--set grid.spacing_m=1");
     let run = |name: &str, threads: u32| {
         let words = format!("--size 16x9 --reference 32 --threads {threads}");
         render(&folder, &scene("two_rooms_open"), &baked.path, name, &words)

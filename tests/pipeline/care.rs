@@ -3,7 +3,9 @@
 use serde_json::Value;
 
 use crate::common::{Folder, Gltf, U16};
-use crate::program::{Run, bake, command, finish, names_in, one_error, refuse, render, run, scene, succeed, text};
+use crate::program::{
+    Run, bake, bake_physical, command, finish, names_in, one_error, refuse, render, run, scene, succeed, text,
+};
 use crate::shapes::diffuse;
 
 /// A scene in several files: a `.gltf`, its buffer, and a folder for outputs.
@@ -97,9 +99,10 @@ fn more_memory_than_there_is() {
         ("grid.divisions=(400,400,400)", "grid.divisions"),
         ("grid.spacing_m=0.02", "grid.spacing_m"),
     ] {
-        let sets = ["--set", "capture.samples_per_texel=16", "--set", "grid.spacing_m=0.5", "--set"];
-        let sets = if word.starts_with("capture") { &sets[..] } else { &sets[4..] };
-        let run = limited(&[&["bake", text(&furnace), "-o", text(&output)][..], sets, &[set]].concat());
+        let preset = ["--preset", "physical", "--set"];
+        let many = ["capture.samples_per_texel=16", "--set", "grid.spacing_m=0.5", "--set"];
+        let sets = [&preset[..], if word.starts_with("capture") { &many[..] } else { &[] }].concat();
+        let run = limited(&[&["bake", text(&furnace), "-o", text(&output)][..], &sets, &[set]].concat());
         let message = one_error(&run);
         for part in [word, "GiB", "available"] {
             assert!(message.contains(part), "{set}: {message}");
@@ -162,7 +165,7 @@ fn mistyped_values() {
         ("grid.divisions=(0,1,1)", &["--set grid.divisions=(0,1,1)"]),
         ("placement.rays=0", &["--set placement.rays=0"]),
     ] {
-        let message = refuse(&["bake", text(&furnace), "--print-config", "--set", set]);
+        let message = refuse(&["bake", text(&furnace), "--print-config", "--preset", "physical", "--set", set]);
         assert!(words.iter().all(|word| message.contains(word)), "{message}");
     }
     let message = refuse(&["bake", text(&furnace), "--print-config", "--set", "seed=1"]);
@@ -364,7 +367,7 @@ fn the_last_energy_is_that_of_the_file() {
             "--set grid.spacing_m=6 --set encoding.irradiance=f32 --env 0.5,0.7,1 --set solver.max_bounces=3",
         ),
     ] {
-        let baked = bake(&folder, &scene(name), words);
+        let baked = bake_physical(&folder, &scene(name), words);
         let last = baked.report["bounces"].as_array().unwrap().last().unwrap()["energy"].as_f64().unwrap();
         // Sums of f32 in another order.
         assert!(
@@ -379,7 +382,14 @@ fn the_last_energy_is_that_of_the_file() {
 fn a_dry_run_foretells_all_that_is_large() {
     let rooms = scene("two_rooms_open");
     let predict = |words: &[&str]| -> Value {
-        succeed(&[&["bake", text(&rooms), "--dry-run", "--json", "--set", "grid.spacing_m=1.5"], words].concat()).json()
+        succeed(
+            &[
+                &["bake", text(&rooms), "--dry-run", "--json", "--preset", "physical", "--set", "grid.spacing_m=1.5"],
+                words,
+            ]
+            .concat(),
+        )
+        .json()
     };
     let small = predict(&[]);
     let large = predict(&["--set", "filter.irradiance_resolution=64"]);

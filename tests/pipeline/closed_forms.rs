@@ -11,7 +11,7 @@ use crate::program::bake;
 use crate::shapes::{Samples, add, add_light, diffuse, dot, irradiance_from_quad, irradiance_under, quad, save};
 
 /// Eight probes between half a metre and a metre above the plane, off its middle; one bounce, fine texels.
-const ABOVE: &str = "--set encoding.irradiance=f32 --set placement.keep_unsampled=true --set solver.max_bounces=1 \
+const ABOVE: &str = "--preset physical --set encoding.irradiance=f32 --set placement.keep_unsampled=true --set solver.max_bounces=1 \
                      --set capture.resolution=64 --set capture.samples_per_texel=2 --set grid.divisions=(2,2,2) \
                      --set grid.bounds={\"min\":[0.2,0.5,-0.1],\"max\":[0.7,1.0,0.4]}";
 

@@ -40,7 +40,7 @@ fn wrong_keys_and_values_of_the_configuration() {
         ("query.visibility.surface.voxels_per_cell=23", &["voxels_per_cell", "22"]),
         ("solver", &["key=value"]),
     ] {
-        bad_bake(&furnace, &["--set", set], words);
+        bad_bake(&furnace, &["--preset", "physical", "--set", set], words);
     }
     bad_bake(&furnace, &["--set", "grid.spacing_m=1", "--set", "grid.divisions=(2,2,2)"], &["remove one"]);
     bad_bake(&furnace, &["--preset", "defualt"], &["defualt", "default"]);

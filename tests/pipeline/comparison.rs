@@ -7,7 +7,7 @@ use lightprobe::image::LayeredImage;
 use serde_json::{Value, json};
 
 use crate::common::Folder;
-use crate::program::{Bake, bake, names_in, refuse, render, scene, succeed, text};
+use crate::program::{Bake, bake_physical, names_in, refuse, render, scene, succeed, text};
 
 const SIZE: &str = "64x36";
 
@@ -19,9 +19,11 @@ struct Rooms {
 }
 
 impl Rooms {
+    /// With probes that hold the light where they stand: what leaked into them can be told.
     fn new() -> Rooms {
         let folder = Folder::new();
-        let baked = bake(&folder, &scene("two_rooms_open"), "--set grid.spacing_m=1.5 --set solver.max_bounces=4");
+        let baked =
+            bake_physical(&folder, &scene("two_rooms_open"), "--set grid.spacing_m=1.5 --set solver.max_bounces=4");
         render(&folder, &scene("two_rooms_open"), &baked.path, "plain", &format!("--size {SIZE}"));
         let exact = LayeredImage::read_exr(&folder.path().join("plain/visibility_ray.exr")).expect("a picture");
         Rooms { folder, baked, exact }

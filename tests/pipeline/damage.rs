@@ -9,13 +9,14 @@ use serde_json::{Value, json};
 use crate::common::Folder;
 use crate::program::{bake, command, finish, one_error, refuse, scene, text};
 
-/// A file with every kind of tensor: surface visibility in one, distance maps in the other.
+/// A file; coefficients with gradients by the preset default, maps by physical, with surface visibility or distance maps.
 fn whole(folder: &Folder, words: &str) -> Vec<u8> {
     bake(folder, &scene("cornell"), &format!("--set grid.divisions=(3,3,3) {words}")).bytes
 }
 
-const MOMENTS: &str =
-    "--set query.visibility={\"moments\":{\"power\":3,\"floor\":0}} --set filter.distance_resolution=4";
+const MAPS: &str = "--preset physical";
+const MOMENTS: &str = "--preset physical \
+    --set query.visibility={\"moments\":{\"power\":3,\"floor\":0}} --set filter.distance_resolution=4";
 
 fn is_refused(folder: &Folder, bytes: &[u8]) -> bool {
     file::read(&folder.write("damaged.probes", bytes)).is_err()
@@ -39,7 +40,7 @@ fn truncated_files() {
 #[test]
 fn flipped_bytes() {
     let folder = Folder::new();
-    for words in ["", MOMENTS] {
+    for words in ["", MAPS, MOMENTS] {
         let bytes = whole(&folder, words);
         let header = 8 + u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
         // Every byte of the length, and a walk through header and tensors; 0x01 and 0x80 make no blank of a blank.
@@ -124,7 +125,7 @@ fn alter_grid(container: &mut Container, key: &str, value: Value) {
 #[test]
 fn wrong_content_under_right_hashes() {
     let folder = Folder::new();
-    let unaltered = altered(&folder, "", |_| {});
+    let unaltered = altered(&folder, MAPS, |_| {});
     assert!(file::read(&unaltered).is_ok());
     let grids: [(&str, Value); 11] = [
         ("divisions", json!([4_294_967_295u32, 4_294_967_295u32, 4_294_967_295u32])),
@@ -140,7 +141,7 @@ fn wrong_content_under_right_hashes() {
         ("kind", json!("spherical")),
     ];
     for (key, value) in grids {
-        let path = altered(&folder, "", |c| alter_grid(c, key, value.clone()));
+        let path = altered(&folder, MAPS, |c| alter_grid(c, key, value.clone()));
         let message = refuse_in_little_memory(&path);
         assert!(message.contains("altered.probes"), "{key} {value}: {message}");
     }
@@ -157,12 +158,12 @@ fn wrong_content_under_right_hashes() {
         ("plan", "{"),
         ("format", "lightprobe/2"),
     ] {
-        let path = altered(&folder, "", |c| drop(c.metadata.insert(key.into(), value.into())));
+        let path = altered(&folder, MAPS, |c| drop(c.metadata.insert(key.into(), value.into())));
         let message = refuse_in_little_memory(&path);
         assert!(message.contains("altered.probes"), "{key} {value}: {message}");
     }
     for key in ["scale.irradiance", "encoding.irradiance", "grid", "scene", "plan", "config", "format"] {
-        let path = altered(&folder, "", |c| drop(c.metadata.remove(key)));
+        let path = altered(&folder, MAPS, |c| drop(c.metadata.remove(key)));
         refuse_in_little_memory(&path);
     }
 }
@@ -182,22 +183,22 @@ fn wrong_tensors_under_right_hashes() {
     let refused = |words: &str, alter: Box<dyn FnOnce(&mut Container)>| {
         refuse_in_little_memory(&altered(&folder, words, alter));
     };
-    refused("", Box::new(set("position", 4, nan)));
-    refused("", Box::new(set("position", 4, infinite)));
-    refused("", Box::new(set("state", 0, [7; 4])));
-    refused("--set encoding.irradiance=f32", Box::new(set("irradiance", 8, nan)));
+    refused(MAPS, Box::new(set("position", 4, nan)));
+    refused(MAPS, Box::new(set("position", 4, infinite)));
+    refused(MAPS, Box::new(set("state", 0, [7; 4])));
+    refused("--preset physical --set encoding.irradiance=f32", Box::new(set("irradiance", 8, nan)));
     // All ones: infinities and NaN of the packed format.
-    refused("", Box::new(set("irradiance", 8, [0xFF; 4])));
-    refused("", Box::new(set("visibility_root", 0, [0xFF; 4])));
+    refused(MAPS, Box::new(set("irradiance", 8, [0xFF; 4])));
+    refused(MAPS, Box::new(set("visibility_root", 0, [0xFF; 4])));
     // A plane whose parts never begin.
-    refused("", Box::new(set("visibility_tree", 0, [0; 4])));
+    refused(MAPS, Box::new(set("visibility_tree", 0, [0; 4])));
     refused(MOMENTS, Box::new(set("distance_scale", 0, nan)));
     refused(MOMENTS, Box::new(set("distance_scale", 0, (-1f32).to_le_bytes())));
     for name in ["position", "state", "irradiance", "visibility_root", "visibility_tree"] {
-        refused("", Box::new(move |c| drop(c.tensors.remove(name))));
+        refused(MAPS, Box::new(move |c| drop(c.tensors.remove(name))));
         // One element short along the first axis.
         refused(
-            "",
+            MAPS,
             Box::new(move |c| {
                 let tensor = c.tensors.get_mut(name).unwrap();
                 let row = tensor.bytes.len() / tensor.shape[0];

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::common::{Folder, Gltf};
 use crate::probe_file::{ProbeFile, Vector};
-use crate::program::{bake, scene, succeed, text};
+use crate::program::{bake_physical, scene, succeed, text};
 use crate::shapes::{add, diffuse, quad, room, save};
 
 const AXES: [(&str, Vector); 6] = [
@@ -56,7 +56,7 @@ fn every_encoding_decodes_outside_the_crate() {
     let folder = Folder::new();
     let scene = colourful(&folder);
     let even = "--set grid.spacing_m=0.7 --set capture.rays.octahedral.guided=0";
-    let exact = bake(&folder, &scene, &format!("{even} --set encoding.irradiance=f32")).file;
+    let exact = bake_physical(&folder, &scene, &format!("{even} --set encoding.irradiance=f32")).file;
     let shape = |file: &ProbeFile| file.tensors["irradiance"].shape[1..].to_vec();
     for (format, dtype, precision) in [
         ("f32", "F32", 1e-6),
@@ -70,7 +70,7 @@ fn every_encoding_decodes_outside_the_crate() {
                     "{even} --set encoding.irradiance={format} --set encoding.curve={curve} \
                      --set encoding.border={border}"
                 );
-                let baked = bake(&folder, &scene, &words);
+                let baked = bake_physical(&folder, &scene, &words);
                 let (file, what) = (&baked.file, format!("{format} {curve} {border}"));
                 assert_eq!(file.tensors["irradiance"].dtype, dtype);
                 assert_eq!(file.metadata["encoding.irradiance"], curve);
@@ -112,7 +112,7 @@ fn axes_are_those_of_the_world() {
         let scene = save(gltf, &folder, "lamp");
         let words = "--set grid.divisions=(2,2,2) --set grid.bounds={\"min\":[-0.1,-0.1,-0.1],\"max\":[0.1,0.1,0.1]} \
                      --set placement.keep_unsampled=true --set encoding.irradiance=f32";
-        let file = bake(&folder, &scene, words).file;
+        let file = bake_physical(&folder, &scene, words).file;
         for probe in 0..8 {
             let texels = file.texels(probe);
             let brightest = texels.iter().max_by(|a, b| a.2[0].total_cmp(&b.2[0])).unwrap();
@@ -128,7 +128,7 @@ fn axes_are_those_of_the_world() {
 fn the_border_continues_the_map() {
     // Edge rows mirror across their middle, corners take the diagonally opposite interior corner.
     let folder = Folder::new();
-    let file = bake(&folder, &colourful(&folder), "--set grid.spacing_m=0.7").file;
+    let file = bake_physical(&folder, &colourful(&folder), "--set grid.spacing_m=0.7").file;
     let n = file.resolution();
     assert_eq!(file.border(), 1);
     for probe in file.active() {
@@ -151,7 +151,8 @@ fn the_border_continues_the_map() {
 fn look_ups_across_the_seam_are_continuous() {
     // Two directions a thousandth of a radian either side of the octahedron's lower edges and around −Z.
     let folder = Folder::new();
-    let file = bake(&folder, &colourful(&folder), "--set grid.spacing_m=0.7 --set encoding.irradiance=f32").file;
+    let file =
+        bake_physical(&folder, &colourful(&folder), "--set grid.spacing_m=0.7 --set encoding.irradiance=f32").file;
     for probe in file.active() {
         let mean = file.mean_irradiance(probe);
         for k in 0..64 {
@@ -172,7 +173,7 @@ fn look_ups_across_the_seam_are_continuous() {
 #[test]
 fn texels_of_inactive_probes_are_zero() {
     let folder = Folder::new();
-    let file = bake(&folder, &scene("cornell"), "--set grid.spacing_m=0.3").file;
+    let file = bake_physical(&folder, &scene("cornell"), "--set grid.spacing_m=0.3").file;
     let states = file.states();
     assert!(states.contains(&1), "no probe inside geometry");
     for probe in (0..states.len()).filter(|&p| states[p] != 0) {
@@ -192,7 +193,7 @@ fn extreme_light_survives_every_format() {
         let inside = "--set grid.divisions=(2,2,2) --set grid.bounds={\"min\":[-0.8,-0.8,-0.8],\"max\":[0.8,0.8,0.8]}";
         let exact = std::f64::consts::TAU * strength;
         for format in ["f32", "f16", "r11g11b10f"] {
-            let baked = bake(&folder, &scene, &format!("{inside} --set encoding.irradiance={format}"));
+            let baked = bake_physical(&folder, &scene, &format!("{inside} --set encoding.irradiance={format}"));
             assert_eq!(baked.report["numerics"]["clamped"]["irradiance"], 0);
             let mean = baked.file.mean_irradiance(0);
             for value in mean {

@@ -13,7 +13,7 @@ use crate::probe_file::Vector;
 use crate::program::bake;
 use crate::shapes::{add, diffuse, dot, moved, room, save};
 
-const MOMENTS: &str = "--set query.visibility={\"moments\":{\"power\":1,\"floor\":0}} --set plan=keep_everything \
+const MOMENTS: &str = "--preset physical --set query.visibility={\"moments\":{\"power\":1,\"floor\":0}} --set plan=keep_everything \
                        --set grid.divisions=(2,2,2) --set grid.bounds={\"min\":[-0.5,-0.5,-0.5],\"max\":[0.4,0.4,0.4]} \
                        --set capture.resolution=64 --set capture.samples_per_texel=4";
 
@@ -173,7 +173,7 @@ fn a_distant_scene_has_the_same_distances() {
     let mut gltf = Gltf::new();
     add(&mut gltf, &room(1), diffuse([0.5; 3], [1.0; 3]));
     let scene = save(gltf, &folder, "room");
-    let words = "--set query.visibility={\"moments\":{\"power\":1,\"floor\":0}} --set plan=keep_everything \
+    let words = "--preset physical --set query.visibility={\"moments\":{\"power\":1,\"floor\":0}} --set plan=keep_everything \
                  --set grid.spacing_m=0.7";
     let here = bake(&folder, &scene, words).file;
     let far = folder.write("far.glb", moved(&std::fs::read(&scene).unwrap(), [1e5, 0.0, -1e5]));

@@ -6,9 +6,10 @@ use serde_json::Value;
 
 use crate::common::Folder;
 use crate::probe_file::ProbeFile;
-use crate::program::{bake, method, refuse, render, scene, succeed, text};
+use crate::program::{bake, bake_physical, method, refuse, render, scene, succeed, text};
 
-const COARSE: &str = "--set grid.spacing_m=1.5 --set fit=rows(rows_per_probe:30,paths:8)";
+/// Over the preset physical, so that each part of what the default has is asked for by itself.
+const COARSE: &str = "--preset physical --set grid.spacing_m=1.5 --set fit=rows(rows_per_probe:30,paths:8)";
 const SH: &str = "--set store.irradiance=sh9(format:f16,gradient:true)";
 
 fn number(value: &Value) -> f64 {
@@ -26,9 +27,10 @@ fn halves(file: &ProbeFile, tensor: &str) -> Vec<f64> {
 fn a_fit_brings_look_ups_nearer_to_the_truth_for_any_number_of_threads() {
     let folder = Folder::new();
     let rooms = scene("two_rooms_open");
-    let plain = bake(&folder, &rooms, "--set grid.spacing_m=1.5");
+    let plain = bake_physical(&folder, &rooms, "--set grid.spacing_m=1.5");
     assert!(plain.report["fit"].is_null() && !plain.file.metadata.contains_key("fit"));
-    assert!(!plain.file.metadata["config"].contains("fit"), "files without a fit say nothing of it");
+    // Also where there is none: given as --config, the stored configuration lies over the preset default, which has one.
+    assert!(plain.file.metadata["config"].contains("fit: none"));
     let error = |path: &std::path::Path, name: &str| {
         let report = render(&folder, &rooms, path, name, "--camera lit --size 48x27 --reference 64 --seed 9");
         number(&method(&report, "visibility_on")["error"]["nrmse"])
@@ -59,8 +61,8 @@ fn a_fit_brings_look_ups_nearer_to_the_truth_for_any_number_of_threads() {
 fn gradients_are_stored_and_counted() {
     let folder = Folder::new();
     let rooms = scene("two_rooms_open");
-    let plain = bake(&folder, &rooms, &format!("--set grid.spacing_m=2 {SH}"));
-    let maps = bake(&folder, &rooms, "--set grid.spacing_m=2");
+    let plain = bake_physical(&folder, &rooms, &format!("--set grid.spacing_m=2 {SH}"));
+    let maps = bake_physical(&folder, &rooms, "--set grid.spacing_m=2");
     let fitted = bake(&folder, &rooms, &format!("{COARSE} {SH} --set grid.spacing_m=2"));
     let probes = fitted.file.states().len();
     assert_eq!(fitted.file.tensors["gradient"].shape, [probes, 3, 3]);
@@ -98,7 +100,7 @@ fn fitted_values_are_no_light_at_the_probes() {
     let report = render(&folder, &rooms, &fitted.path, "fitted", view);
     assert!(report["baked"].is_null() && method(&report, "visibility_on")["leak"]["baked"].is_null());
     assert!(report["baked_reason"].as_str().unwrap().contains("fitted"));
-    let plain = bake(&folder, &rooms, set);
+    let plain = bake_physical(&folder, &rooms, set);
     let report = render(&folder, &rooms, &plain.path, "plain", view);
     assert!(report["baked"]["light"].is_number() && report["baked_reason"].is_null());
 }
@@ -106,7 +108,7 @@ fn fitted_values_are_no_light_at_the_probes() {
 #[test]
 fn look_ups_that_are_no_sums_are_refused() {
     let refused = |set: &str| {
-        let mut words = vec!["bake", "--print-config", "--set", "fit=rows()", "--set", set];
+        let mut words = vec!["bake", "--print-config", "--preset", "physical", "--set", "fit=rows()", "--set", set];
         words.extend(["--set", "query.direction=uniform"]);
         refuse(&words)
     };

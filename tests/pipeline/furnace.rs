@@ -10,7 +10,7 @@ use crate::program::{bake, scene};
 use crate::shapes::{Samples, add, diffuse, quad, room, save};
 
 /// Probes in the air of the room only; hits on its walls lie outside their hull and use the nearest cell.
-const INSIDE: &str = "--set encoding.irradiance=f32 --set grid.divisions=(3,3,3) \
+const INSIDE: &str = "--preset physical --set encoding.irradiance=f32 --set grid.divisions=(3,3,3) \
                       --set grid.bounds={\"min\":[-0.8,-0.8,-0.8],\"max\":[0.8,0.8,0.8]}";
 
 /// Bounces missing when the solver stops (`solver.tolerance` 1e-4, relative to the largest irradiance, judged by an
@@ -59,7 +59,7 @@ fn expected(emission: [f64; 3], albedo: [f64; 3]) -> [f64; 3] {
 #[test]
 fn the_scene_of_the_repository() {
     let folder = Folder::new();
-    let words = "--set encoding.irradiance=f32 --set grid.divisions=(4,4,4) \
+    let words = "--preset physical --set encoding.irradiance=f32 --set grid.divisions=(4,4,4) \
                  --set grid.bounds={\"min\":[-0.9,0.1,-0.9],\"max\":[0.9,1.9,0.9]}";
     let files = seeds(&folder, &scene("furnace"), words, 4);
     // The walls use the outer probes only; the 2³ inner ones are not asked by any surface.
@@ -86,7 +86,12 @@ fn probes_of_the_default_grid_within_the_room() {
     // which emitters are seen, so that emitters are sampled and there is noise to test: 0.33 % (rms) in the mean of a
     // probe under one seed, so the 0.5 % is asked of the mean over twelve, where it is five standard errors.
     let folder = Folder::new();
-    let files = seeds(&folder, &scene("furnace"), "--set encoding.irradiance=f32 --set grid.spacing_m=0.6", 12);
+    let files = seeds(
+        &folder,
+        &scene("furnace"),
+        "--preset physical --set encoding.irradiance=f32 --set grid.spacing_m=0.6",
+        12,
+    );
     let inside = |p: &usize| {
         let [x, y, z] = files[0].position(*p);
         x.abs() < 1.0 && (y - 1.0).abs() < 1.0 && z.abs() < 1.0
@@ -185,7 +190,7 @@ fn a_sky_above_a_black_plane_lights_by_half_the_cosine() {
     let plane = quad([-2000.0, 0.0, -2000.0], [0.0, 0.0, 4000.0], [4000.0, 0.0, 0.0], 1);
     add(&mut gltf, &plane, diffuse([0.0; 3], [0.0; 3]));
     let scene = save(gltf, &folder, "plane");
-    let words = "--set encoding.irradiance=f32 --env 1,1,1 --set placement.keep_unsampled=true \
+    let words = "--preset physical --set encoding.irradiance=f32 --env 1,1,1 --set placement.keep_unsampled=true \
                  --set grid.divisions=(2,2,2) --set grid.bounds={\"min\":[-0.5,0.5,-0.5],\"max\":[0.5,1.5,0.5]} \
                  --set capture.samples_per_texel=4";
     let files = seeds(&folder, &scene, words, 8);

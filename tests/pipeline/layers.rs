@@ -6,7 +6,7 @@ use glam::Vec3;
 use lightprobe::image::LayeredImage;
 
 use crate::common::Folder;
-use crate::program::{bake, render, scene, succeed, text};
+use crate::program::{bake, bake_physical, render, scene, succeed, text};
 
 fn of_project(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
@@ -56,7 +56,7 @@ fn files_of_before_show_the_same_picture() {
 fn probes_are_lit_by_paths_on_request_only() {
     let folder = Folder::new();
     let rooms = scene("two_rooms_open");
-    let baked = bake(&folder, &rooms, "--set grid.spacing_m=3 --set capture.resolution=8");
+    let baked = bake_physical(&folder, &rooms, "--set grid.spacing_m=3 --set capture.resolution=8");
     let names = |report: &serde_json::Value| -> Vec<String> {
         let methods = report["methods"].as_array().unwrap();
         methods.iter().map(|m| m["name"].as_str().unwrap().to_owned()).collect()

@@ -1,4 +1,5 @@
-//! Light that comes through walls: figures of the report and of the pictures themselves.
+//! Light that comes through walls: figures of the report and of the pictures themselves. Of the preset physical, whose values
+//! are not fitted with visibility: pictures without it say what it does.
 
 use glam::Vec3;
 use lightprobe::image::LayeredImage;
@@ -6,7 +7,7 @@ use lightprobe::math::color::luminance;
 use serde_json::Value;
 
 use crate::common::Folder;
-use crate::program::{Bake, bake, method, render, scene};
+use crate::program::{Bake, bake_physical, method, render, scene};
 
 /// A metre between probes, the wall between two planes of them.
 const SPACING: &str = "--set grid.spacing_m=1";
@@ -35,7 +36,7 @@ fn leak_light(report: &Value) -> f64 {
 #[test]
 fn a_sealed_wall_leaks_without_visibility_and_not_with_it() {
     let folder = Folder::new();
-    let baked = bake(&folder, &scene("two_rooms_sealed"), SPACING);
+    let baked = bake_physical(&folder, &scene("two_rooms_sealed"), SPACING);
     let planes: Vec<f64> = (0..baked.file.states().len()).map(|p| baked.file.position(p)[0]).collect();
     assert!(planes.iter().all(|x| x.abs() > 0.3), "a plane of probes lies in the wall");
     let lit = view(&folder, "two_rooms_sealed", &baked, "lit");
@@ -58,7 +59,7 @@ fn a_sealed_wall_leaks_without_visibility_and_not_with_it() {
 #[test]
 fn blocks_are_the_pixels_that_are_off_by_a_quarter() {
     let folder = Folder::new();
-    let baked = bake(&folder, &scene("two_rooms_open"), SPACING);
+    let baked = bake_physical(&folder, &scene("two_rooms_open"), SPACING);
     let report = view(&folder, "two_rooms_open", &baked, "dark");
     let exact: Vec<f32> = irradiance(&folder, "dark", "visibility_ray").into_iter().map(luminance).collect();
     let least = 0.01 * exact.iter().sum::<f32>() / exact.len() as f32;
@@ -76,7 +77,7 @@ fn blocks_are_the_pixels_that_are_off_by_a_quarter() {
     assert_eq!(method(&report, "visibility_ray")["leak"]["blocks"], 0.0);
     // Probes in the lit room alone: what the camera in the other one sees lies beyond them.
     let bounds = "--set grid.bounds=(min:(-4,0,-2),max:(-0.2,2.5,2))";
-    let half = bake(&folder, &scene("two_rooms_open"), &format!("{SPACING} {bounds}"));
+    let half = bake_physical(&folder, &scene("two_rooms_open"), &format!("{SPACING} {bounds}"));
     let report = view(&folder, "two_rooms_open", &half, "dark");
     let outside = method(&report, "visibility_on")["outside_hull"].as_f64().unwrap();
     assert!(outside > 0.5 && outside <= 1.0, "{outside}");
@@ -85,7 +86,7 @@ fn blocks_are_the_pixels_that_are_off_by_a_quarter() {
 #[test]
 fn the_far_room_is_lit_through_the_passage() {
     let folder = Folder::new();
-    let baked = bake(&folder, &scene("two_rooms_open"), SPACING);
+    let baked = bake_physical(&folder, &scene("two_rooms_open"), SPACING);
     for camera in ["lit", "dark"] {
         let report = view(&folder, "two_rooms_open", &baked, camera);
         assert!(leak_light(&report) <= 0.001, "{camera}: {report}");
@@ -104,7 +105,7 @@ fn the_far_room_is_lit_through_the_passage() {
 #[test]
 fn a_wall_of_a_millimetre_is_a_wall() {
     let folder = Folder::new();
-    let baked = bake(&folder, &scene("thin_wall"), SPACING);
+    let baked = bake_physical(&folder, &scene("thin_wall"), SPACING);
     for camera in ["middle", "behind_solid"] {
         view(&folder, "thin_wall", &baked, camera);
     }
@@ -118,7 +119,7 @@ fn a_wall_of_a_millimetre_is_a_wall() {
 #[test]
 fn a_single_sheet_is_a_wall_from_behind_too() {
     let folder = Folder::new();
-    let baked = bake(&folder, &scene("thin_wall"), SPACING);
+    let baked = bake_physical(&folder, &scene("thin_wall"), SPACING);
     for camera in ["middle", "behind_sheet"] {
         view(&folder, "thin_wall", &baked, camera);
     }

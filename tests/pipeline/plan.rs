@@ -4,10 +4,11 @@ use glam::Vec3;
 use lightprobe::image::LayeredImage;
 
 use crate::common::{Folder, Gltf};
+use crate::probe_file::Tensor;
 use crate::program::{bake, names_in, render, scene};
 use crate::shapes::{add, diffuse, room, save};
 
-const MOMENTS: &str = "--set query.visibility={\"moments\":{\"power\":3,\"floor\":0}}";
+const MOMENTS: &str = "--preset physical --set query.visibility={\"moments\":{\"power\":3,\"floor\":0}}";
 
 fn layer(folder: &Folder, run: &str, method: &str) -> Vec<Vec3> {
     let path = folder.path().join(run).join(format!("{method}.exr"));
@@ -22,12 +23,22 @@ fn check(scene: &std::path::Path, words: &str, render_words: &str) {
     let what = format!("{} {words}", scene.display());
     let lines = full.report["plan"].as_array().unwrap();
     assert!(lines.iter().all(|l| l["stage"] == "bounces" || l["kept"] == true), "{what}");
-    let texels = |bake: &crate::program::Bake, probe: usize| bake.file.texels(probe);
+    // Maps, or coefficients and gradients.
+    let held = |bake: &crate::program::Bake, probe: usize| -> Vec<Vec<u8>> {
+        let tensors = ["irradiance", "sh", "gradient"].iter().filter_map(|name| bake.file.tensors.get(*name));
+        let row = |t: &Tensor| t.bytes.len() / t.shape[0];
+        tensors.map(|t| t.bytes[probe * row(t)..][..row(t)].to_vec()).collect()
+    };
+    let scale = |bake: &crate::program::Bake| bake.file.metadata["scale.irradiance"].clone();
+    assert_eq!(scale(&lean), scale(&full), "{what}");
     let active = lean.file.active();
     assert!(!active.is_empty(), "{what}");
     for &probe in &active {
         assert_eq!(full.file.states()[probe], 0, "{what}: probe {probe} is active in the lean bake only");
-        assert!(texels(&lean, probe) == texels(&full, probe), "{what}: probe {probe} differs");
+        assert!(
+            !held(&lean, probe).is_empty() && held(&lean, probe) == held(&full, probe),
+            "{what}: probe {probe} differs"
+        );
     }
     for (run, baked) in [("lean", &lean), ("full", &full)] {
         render(&folder, scene, &baked.path, run, &format!("--size 64x36 {render_words}"));
@@ -73,10 +84,14 @@ fn a_room_without_anything_in_the_way_has_no_visibility() {
     let scene = save(gltf, &folder, "room");
     // With bounds inside the room the walls would lie beyond the survey, and visibility would be kept.
     let inside = "--set grid.divisions=(4,4,4)";
-    for visibility in ["", MOMENTS] {
+    for (visibility, held) in [
+        ("", &["gradient", "position", "sh", "state"][..]),
+        ("--preset physical", &["irradiance", "position", "state"]),
+        (MOMENTS, &["irradiance", "position", "state"]),
+    ] {
         let baked = bake(&folder, &scene, &format!("{inside} {visibility}"));
         let names: Vec<&String> = baked.file.tensors.keys().collect();
-        assert_eq!(names, ["irradiance", "position", "state"], "{visibility}");
+        assert_eq!(names, held, "{visibility}");
         let line = |stage: &str| {
             let lines = baked.report["plan"].as_array().unwrap();
             lines.iter().find(|l| l["stage"] == stage).unwrap_or_else(|| panic!("no line {stage}")).clone()

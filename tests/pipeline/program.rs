@@ -91,6 +91,11 @@ pub fn bake(folder: &Folder, scene: &Path, words: &str) -> Bake {
     Bake { file: ProbeFile::parse(&bytes), path, bytes, report }
 }
 
+/// As [`bake`] by the preset `physical`: maps of the light where the probes stand. `words` name no preset.
+pub fn bake_physical(folder: &Folder, scene: &Path, words: &str) -> Bake {
+    bake(folder, scene, &format!("--preset physical {words}"))
+}
+
 /// Renders a small picture into `folder`/`name`; the report.
 pub fn render(folder: &Folder, scene: &Path, probes: &Path, name: &str, words: &str) -> Value {
     let output = folder.path().join(name);

@@ -7,7 +7,8 @@ use crate::common::{Folder, Gltf};
 use crate::program::{bake, names_in, refuse, render, run, succeed, text};
 use crate::shapes::{add, add_light, diffuse, quad, room, save};
 
-const GRID: &str = "--set grid.divisions=(2,2,2) --set store.irradiance.octahedral.format=f32 --threads 1";
+const GRID: &str =
+    "--preset physical --set grid.divisions=(2,2,2) --set store.irradiance.octahedral.format=f32 --threads 1";
 
 /// A lit room whose walls have this material, or none.
 fn lit_room(material: Option<serde_json::Value>) -> Gltf {

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::common::Folder;
-use crate::program::{Bake, bake, render, scene, succeed, text};
+use crate::program::{Bake, bake, bake_physical, render, scene, succeed, text};
 
 /// Checks keys (dots separate levels) for numbers that are finite and not negative.
 fn numbers(report: &Value, keys: &[&str]) {
@@ -42,7 +42,7 @@ fn bake_reports() {
         ("glossy_room", "--set grid.spacing_m=1.5 --set encoding.border=0 --seed 5 --measure-raw".to_owned()),
         ("cornell", "--set query.visibility=none --set grid.spacing_m=0.5 --set encoding.irradiance=f32".to_owned()),
     ] {
-        let baked = bake(&folder, &scene(name), &words);
+        let baked = bake_physical(&folder, &scene(name), &words);
         let report = &baked.report;
         common(report, "bake");
         numbers(
@@ -155,7 +155,7 @@ fn plain_and_combined_iterations_find_the_same_light() {
     let rooms = scene("two_rooms_open");
     let baked = |how: &str| {
         let words = format!("--set grid.spacing_m=1.5 --set encoding.irradiance=f32 --set solver.acceleration={how}");
-        bake(&folder, &rooms, &words)
+        bake_physical(&folder, &rooms, &words)
     };
     let (plain, combined) = (baked("never"), baked("always"));
     let iterations = |baked: &Bake| baked.report["bounces"].as_array().unwrap().len();
@@ -174,7 +174,7 @@ fn plain_and_combined_iterations_find_the_same_light() {
 #[test]
 fn the_spectral_radius_of_a_furnace_is_its_albedo() {
     let folder = Folder::new();
-    let report = bake(&folder, &scene("furnace"), "--set grid.spacing_m=0.5").report;
+    let report = bake_physical(&folder, &scene("furnace"), "--set grid.spacing_m=0.5").report;
     let radius = report["spectral_radius_estimate"].as_f64().unwrap();
     // From changes near the solver's tolerance of 1e-4, after a dozen bounces that leave other modes behind.
     assert!((radius - 0.5).abs() < 0.02, "{radius}");

@@ -7,7 +7,7 @@ use crate::common::{Folder, Gltf};
 use crate::program::{Bake, bake, refuse, run, succeed, text};
 use crate::shapes::{add, diffuse, quad, save};
 
-const WORDS: &str = "--set grid.divisions=(2,2,2) --set grid.bounds={\"min\":[-1,-1,-1],\"max\":[1,1,1]} \
+const WORDS: &str = "--preset physical --set grid.divisions=(2,2,2) --set grid.bounds={\"min\":[-1,-1,-1],\"max\":[1,1,1]} \
                      --set placement.keep_unsampled=true --set encoding.irradiance=f32";
 
 /// One square centimetre of geometry, some metres away.

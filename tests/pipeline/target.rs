@@ -6,7 +6,7 @@ use crate::common::{Folder, Gltf};
 use crate::program::{bake, method, names_in, refuse, render, run, scene, succeed, text};
 
 /// Rough and quick.
-const SH: &str = "--set store.irradiance=sh9(format:f16,gradient:true) --set fit=rows(rows_per_probe:30,paths:4)";
+const ROUGH: &str = "--set fit=rows(rows_per_probe:30,paths:4)";
 
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
@@ -17,7 +17,7 @@ fn number(value: &Value) -> f64 {
 fn an_error_is_reached_and_the_file_is_an_ordinary_one() {
     let folder = Folder::new();
     let rooms = scene("two_rooms_open");
-    let words = format!("--set grid.spacing_m=2.5 {SH} --target-error 0.3 --seed 4");
+    let words = format!("--set grid.spacing_m=2.5 {ROUGH} --target-error 0.3 --seed 4");
     let found = bake(&folder, &rooms, &format!("{words} --threads 1"));
     let target = &found.report["target"];
     assert_eq!((&target["met"], &target["stopped_because"]), (&Value::Bool(true), &"reached".into()), "{target}");

@@ -161,7 +161,7 @@ fn check_pictures(folder: &Path) {
     }
 }
 
-/// Saves the scene and bakes it; `words` are separated by blanks.
+/// Saves the scene and bakes it, by the preset physical where the words name none; `words` are separated by blanks.
 pub fn bake(gltf: Gltf, words: &str) -> Baked {
     let folder = Folder::new();
     let scene = save(gltf, &folder, "scene");
@@ -177,7 +177,8 @@ pub fn bake_dark(gltf: Gltf, words: &str) -> Baked {
 
 /// Bakes a scene that lies in a folder.
 pub fn bake_file(folder: Folder, scene: PathBuf, words: &str, lit: bool) -> Baked {
-    let program::Bake { path, file, report, .. } = program::bake(&folder, &scene, words);
+    let bake = if words.contains("--preset") { program::bake } else { program::bake_physical };
+    let program::Bake { path, file, report, .. } = bake(&folder, &scene, words);
     let flat = is_flat(&file);
     check_report(&report, Of { lit, flat });
     check_file(&file);

@@ -61,8 +61,8 @@ const COARSE: &str = "near edges coarse distances reject probes behind the next 
 
 const METHODS: [Method; 8] = [
     Method {
-        name: "default",
-        words: "--set encoding.irradiance=f32 --set capture.resolution=16",
+        name: "physical",
+        words: "--preset physical --set encoding.irradiance=f32 --set capture.resolution=16",
         iterations: "sweeps",
         base: 1,
         above: 1e-3,
@@ -72,8 +72,8 @@ const METHODS: [Method; 8] = [
         why: NOTHING,
     },
     Method {
-        name: "fitted",
-        words: "--preset fitted --set store.irradiance.sh9.format=f32",
+        name: "default",
+        words: "--preset default --set store.irradiance.sh9.format=f32",
         iterations: "sweeps",
         base: 1,
         above: PATHS,

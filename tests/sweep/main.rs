@@ -85,7 +85,8 @@ fn number(value: &Value) -> f64 {
 #[test]
 fn a_sweep_writes_report_table_and_plots() {
     let folder = Folder::new();
-    let words = format!("{COMMON} --ladder {}", text(&ladder(&folder, LADDER)));
+    // The shares of bake and interpolation are known of probes that hold the light where they stand.
+    let words = format!("{COMMON} --preset physical --ladder {}", text(&ladder(&folder, LADDER)));
     let shown = sweep(&folder, "out", &words);
     for part in ["tiny spacing_m=1.5 resolution=8", "cheapest configuration", "interpolation", "wrote"] {
         assert!(shown.stdout.contains(part), "no '{part}' in {}", shown.stdout);
@@ -144,7 +145,7 @@ fn a_sweep_writes_report_table_and_plots() {
     let table = std::fs::read_to_string(out.join("sweep.csv")).unwrap();
     let rows: Vec<&str> = table.lines().collect();
     assert_eq!(rows.len(), 1 + 4 * 2 * 3);
-    assert!(rows.iter().skip(1).all(|row| row.starts_with("tiny,default,")), "{table}");
+    assert!(rows.iter().skip(1).all(|row| row.starts_with("tiny,physical,")), "{table}");
     for name in ["error_time", "error_bytes", "error_shading", "leak_bytes"] {
         let svg = std::fs::read_to_string(out.join(format!("{name}.svg"))).unwrap();
         assert!(svg.starts_with("<svg") && svg.contains("sans-serif") && svg.contains("tiny"), "{name}");
@@ -251,9 +252,9 @@ fn methods_are_compared_at_equal_cost() {
     let folder = Folder::new();
     let plain =
         folder.write("plain.ron", "(query: (visibility: none), placement: (rays: 32), solver: (max_bounces: 2))");
-    // Maps of 18² texels of 12 bytes: ten times the bytes of the other.
+    // Maps of 18² texels of 12 bytes: ten times the bytes of the other and more.
     let fine = "(query: (visibility: surface(voxels_per_cell: 4)), grid: (spacing_m: 0.1), solver: (max_bounces: 2),
-        encoding: (irradiance: f32), filter: (irradiance_resolution: 16))";
+        store: (irradiance: octahedral(format: f32, resolution: 16)))";
     let fine = folder.write("fine.ron", fine);
     let axis = "(ladders: [(name: \"grid\", set: [\"capture.resolution=4\"], axes: [(key: \"grid.spacing_m\", values: [2.5, 2.0])])])";
     let words = format!(
@@ -316,7 +317,10 @@ fn all_methods_are_compared_in_one_table_and_one_picture() {
     let report = report(&folder, "out");
     let labels: Vec<&str> = list(&report, "configurations").iter().map(|c| c["label"].as_str().unwrap()).collect();
     let names: Vec<&str> = lightprobe::config::presets::methods().map(|preset| preset.name).collect();
-    assert!(labels == names && names.contains(&"default") && !names.contains(&"path"), "{labels:?}");
+    assert!(
+        labels == names && ["default", "physical"].iter().all(|name| names.contains(name)) && !names.contains(&"path"),
+        "{labels:?}"
+    );
     assert!(list(&report, "floor").is_empty());
     for configuration in list(&report, "configurations") {
         let figures = &configuration["figures"];

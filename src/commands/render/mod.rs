@@ -102,7 +102,9 @@ fn folder(args: &RenderArgs, camera: &Camera) -> PathBuf {
 fn truth(args: &RenderArgs, session: &Session, world: &World, probes: &ProbeFile, volume: &Volume) -> BakedTruth {
     let place = format!("{}: its configuration", args.probes.display());
     let config = Config::parse(&probes.config, &place).unwrap_or_else(|error| {
-        session.console.warn(format!("{error}; the probes' own error is measured with the default rays"));
+        session
+            .console
+            .warn(format!("{error}; the probes' own error is measured with the rays of the preset physical"));
         Config::default()
     });
     let paths = args.reference.map_or(1, BakedTruth::paths_for);

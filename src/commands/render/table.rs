@@ -5,6 +5,7 @@ use crate::report::baked::BakedReport;
 use crate::report::error::{ErrorEstimate, ErrorReport};
 use crate::report::render::{MethodReport, RenderReport};
 use crate::report::table::{Column, Table};
+use crate::shade::visibility_modes::VisibilityMode;
 use crate::system::format;
 
 /// One camera's table, and in words where the errors lie.
@@ -29,7 +30,7 @@ pub fn table(report: &RenderReport) -> String {
         let error = errors_of(method).map(|e| relative_rmse(&e.all));
         table.push([
             if method.name == PATH_RAY { "path-traced probes" } else { "probes" }.to_owned(),
-            visibility(method).to_owned(),
+            column(report, method),
             format::seconds(method.shade_ms.median / 1e3),
             format::seconds(method.ray_ms / 1e3),
             method.lookup_ns.map_or(format::UNDEFINED.to_owned(), |ns| format::seconds(ns / 1e9)),
@@ -53,7 +54,10 @@ pub fn table(report: &RenderReport) -> String {
     text.extend(report.methods.iter().map(|method| format!("\n{}", air_line(method))));
     let baked = report.baked.as_ref().filter(|b| b.figures.bias.is_some()).map(baked_line);
     if report.fitted {
-        text.push_str("\nfitted probes: the row without visibility says nothing of the method");
+        text.push_str(&format!(
+            "\n{UNFIT}: fitted values are right with the visibility that they were fitted with, so this row says nothing of \
+             the method; bake with --preset physical to see what visibility does"
+        ));
     }
     let reason = report.baked_reason.map(|reason| format!("no figure of the bake itself: {reason}"));
     for line in error_lines(report, mean).into_iter().chain(baked).chain(reason) {
@@ -70,6 +74,15 @@ fn errors_of(method: &MethodReport) -> Option<&ErrorReport> {
 
 fn visibility(method: &MethodReport) -> &'static str {
     if method.name == PATH_RAY { "ray" } else { method.name.trim_start_matches("visibility_") }
+}
+
+/// What the table says of the visibility of fitted probes where it is not that of the fit.
+const UNFIT: &str = "off (not what was fitted)";
+
+/// A method's visibility in the table.
+fn column(report: &RenderReport, method: &MethodReport) -> String {
+    let is_unfit = report.fitted && method.name == VisibilityMode::Off.name();
+    if is_unfit { UNFIT } else { visibility(method) }.to_owned()
 }
 
 /// A method in a sentence.

@@ -26,8 +26,8 @@ pub fn ladders(args: &SweepArgs, file: Option<&LadderFile>) -> Result<Vec<Ladder
     Ok(ladders)
 }
 
-/// The methods that the command line names; the default where neither it nor all ladders name any. Files lie over every
-/// preset; without presets each is a method of its own.
+/// The methods that the command line names; the preset `default` where neither it nor all ladders name any. Files lie over
+/// every preset; without presets each is a method of its own, over `default`.
 fn methods(args: &SweepArgs, file: Option<&LadderFile>) -> Result<Vec<Method>> {
     let mut methods: Vec<Method> = Vec::new();
     for name in &args.preset {

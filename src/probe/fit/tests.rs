@@ -241,7 +241,7 @@ fn conjugate_gradients_reach_the_dense_solution() {
     }
     // Texels beyond the border of a map are texels of its far side: such factors are squared before they are added up.
     for (i, diagonal) in rows.diagonal().into_iter().enumerate() {
-        let exact = matrix[(i, i)] - lambda;
+        let exact = matrix[(i, i)] - lambda[i];
         assert!((0.5..1.0 + 1e-6).contains(&(diagonal / exact)), "{diagonal} {exact}");
     }
     let cholesky = matrix.cholesky().unwrap();

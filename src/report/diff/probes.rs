@@ -15,8 +15,8 @@ use crate::probe::file;
 use crate::probe::lattice::ProbeState;
 use crate::probe::{ProbeIndex, Volume};
 
-/// Directions that each probe is asked in: as many as the default has texels, but not their centres, so that what lies
-/// between them (borders, seams) counts too.
+/// Directions that each probe is asked in: as many as the maps of the preset physical have texels, but not their centres, so
+/// that what lies between them (borders, seams) counts too.
 const DIRECTIONS: usize = 64;
 
 /// The volume is divided into so many regions along each axis.

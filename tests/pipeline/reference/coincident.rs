@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use super::{Check, STRATEGIES, camera, load, points, settings, small, world};
 use crate::common::{Folder, Gltf};
 use crate::probe_file::Vector;
-use crate::program::{bake, method, render, scene};
+use crate::program::{bake_physical, method, render, scene};
 use crate::shapes::{Samples, add, add_light, diffuse, irradiance_from_quad, quad, room, save};
 
 const DOWN: Vec3 = Vec3::NEG_Y;
@@ -149,7 +149,7 @@ fn paths_and_bakes_see_the_lamp_in_the_ceiling() {
         let (lamp, node) = light(kind, [0.3, if name.ends_with("in") { 1.0 } else { 0.999 }, 0.1]);
         add_light(&mut gltf, lamp, node);
         let path = save(gltf, &folder, name);
-        let baked = bake(&folder, &path, "--set encoding.irradiance=f32 --set grid.divisions=(3,3,3)").file;
+        let baked = bake_physical(&folder, &path, "--set encoding.irradiance=f32 --set grid.divisions=(3,3,3)").file;
         let active = baked.active();
         let baked = active.iter().map(|&p| baked.mean_irradiance(p)[0]).sum::<f64>() / active.len() as f64;
         let scene = load(&path);
@@ -313,7 +313,8 @@ fn bakes_see_the_lamp_in_the_plane_of_the_ceiling() {
         }
         let folder = Folder::new();
         let path = save(assembled(&parts, DQuat::IDENTITY), &folder, "coplanar");
-        let files: Vec<_> = (0..4).map(|seed| bake(&folder, &path, &format!("{words} --seed {seed}")).file).collect();
+        let files: Vec<_> =
+            (0..4).map(|seed| bake_physical(&folder, &path, &format!("{words} --seed {seed}")).file).collect();
         assert_eq!(files[0].active().len(), 8);
         for probe in files[0].active() {
             let (position, texels) = (files[0].position(probe), files[0].texels(probe));
@@ -334,7 +335,7 @@ fn probes_in_the_walls_of_a_room_see_all_of_it() {
     let bounds = "--set grid.bounds=(min:(-1,0,-1),max:(1,2,1)) --set grid.divisions=(3,3,3)";
     for rule in ["placement.rule=grid_points", "placement.relocate=false"] {
         let words = format!("{bounds} --set {rule} --set encoding.irradiance=f32 --set capture.emission=gathered");
-        let baked = bake(&folder, &scene("furnace"), &words);
+        let baked = bake_physical(&folder, &scene("furnace"), &words);
         assert_eq!(baked.file.active().len(), 27, "{rule}");
         for probe in baked.file.active() {
             for (normal, _, irradiance) in baked.file.texels(probe) {

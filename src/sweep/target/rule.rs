@@ -7,8 +7,9 @@
 /// The error that a step is made for, as a share of what is asked for: the rest is for the standard error and for chance.
 const AIM: f64 = 0.9;
 
-/// Bounds of the exponent p, and what it is before two steps tell. Linear interpolation has 2, leaks at edges 1 or less.
-const EXPONENT: (f64, f64) = (0.7, 2.0);
+/// Bounds of the exponent p, and what it is before two steps tell. Linear interpolation has 2, leaks at edges 1 or less; what
+/// two steps make of it is uncertain.
+const EXPONENT: (f64, f64) = (0.7, 1.5);
 const FIRST_EXPONENT: f64 = 1.0;
 
 /// A step is no finer than this share of the spacing before: it has eight times the probes.
@@ -27,8 +28,10 @@ const APART: f64 = 1.1;
 const NOISE_SHARE: f64 = 0.25;
 const MOST_SAMPLES: u32 = 16;
 
-/// The error falls if it becomes less than this share of the smallest before.
-const FALL: f64 = 0.97;
+/// The error falls if it does so at least by this exponent with the spacing, and at least to this share of the smallest
+/// before: at a smaller exponent, half the error takes 400 times the probes.
+const LEAST_EXPONENT: f64 = 0.35;
+const LEAST_FALL: f64 = 0.97;
 /// Steps that may fail to let it fall, one after another.
 const MOST_FLAT: usize = 2;
 
@@ -155,8 +158,11 @@ fn coarser(steps: &[Step], met: &Step, error: f64) -> Option<Choice> {
 /// Whether the last steps have not let the error fall.
 fn is_flat(steps: &[Step]) -> bool {
     let Some(last) = steps.len().checked_sub(MOST_FLAT).filter(|&before| before > 0) else { return false };
-    let least = |steps: &[Step]| steps.iter().map(|s| s.error).fold(f64::INFINITY, f64::min);
-    least(&steps[last..]) > FALL * least(&steps[..last])
+    let (before, after) = steps.split_at(last);
+    let least = |steps: &[Step]| steps.iter().copied().min_by(|a, b| a.error.total_cmp(&b.error));
+    let (Some(before), Some(after)) = (least(before), least(after)) else { return false };
+    let wanted = (after.spacing_m / before.spacing_m).powf(LEAST_EXPONENT).min(LEAST_FALL);
+    after.error > wanted * before.error
 }
 
 /// The finest; of several the last.

@@ -9,11 +9,15 @@
 //! * before a void: where all rays leave a scene that has no sky, or a quarter of them does and no path brings light, as at
 //!   the outer faces of a closed room;
 //! * away from the box that probes were asked for: farther than [`REACH`], or not in sight of it.
+//!
+//! Pictures weigh surfaces by how much of them a camera sees. To tell the error of one, the points of a picture are judged
+//! in the same way.
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::block_mean::BlockMean;
+use super::points::see_pixel;
 use crate::light::World;
 use crate::light::path::PathSettings;
 use crate::light::sides::{Place, Sides};
@@ -24,10 +28,14 @@ use crate::math::random::{KroneckerSequence, Purpose, Random};
 use crate::math::sampling::cosine_hemisphere;
 use crate::probe::query::QueryPoint;
 use crate::probe::store::surface::Facing;
+use crate::scene::Camera;
 use crate::trace::Ray;
 
 /// Points that are looked for.
 const POINTS: usize = 16_384;
+
+/// Pixels of a picture, in the shape that pictures have where no size is given.
+const PICTURE: (u32, u32) = (96, 54);
 
 /// Rounds in which they are looked for: sides that are left out may use up all points of one.
 const ROUNDS: usize = 4;
@@ -63,28 +71,28 @@ impl HeldOut {
     /// probes were asked for, relative to the scene's origin; `None`: the whole scene.
     pub fn new(world: &World, bounds: Option<(Vec3, Vec3)>, error: f64, seed: u64) -> HeldOut {
         let (points, leaving): (Vec<_>, Vec<bool>) = points(world, bounds, seed).into_iter().unzip();
-        let keys = points.iter().map(|(surface, _)| world.places.key_of(surface)).collect();
-        let expected = world.expect(keys);
-        let path = PathSettings { expected: Some(&expected), ..PathSettings::default() };
-        let mut truth = vec![BlockMean::default(); points.len()];
-        let mut blocks = FIRST_BLOCKS;
-        loop {
-            truth.par_iter_mut().zip(&points).enumerate().for_each(|(index, (light, (surface, query)))| {
-                for b in light.blocks..blocks {
-                    let block = Block::new(seed, Purpose::HeldOutPaths, index as u64, u64::from(b));
-                    light.add(world, (surface, query), &path, &block);
-                }
-            });
-            if blocks >= MOST_BLOCKS || noise(&truth, error) <= NOISE_SHARE * error {
-                break;
-            }
-            blocks *= 2;
+        let all = HeldOut { truth: light(world, &points, 0, error, seed), points };
+        if !all.is_lit() {
+            return all;
         }
         let counts = |(light, leaving): (&BlockMean, &bool)| !leaving || light.mean.max_element() > 0.0;
-        let counted: Vec<bool> = truth.iter().zip(&leaving).map(counts).collect();
-        let kept = points.into_iter().zip(truth).zip(counted).filter(|(_, counts)| *counts);
+        let counted: Vec<bool> = all.truth.iter().zip(&leaving).map(counts).collect();
+        let kept = all.points.into_iter().zip(all.truth).zip(counted).filter(|(_, counts)| *counts);
         let (points, truth) = kept.map(|(point, _)| point).unzip();
         HeldOut { points, truth }
+    }
+
+    /// The same of what a camera sees, one point a pixel. `index` tells the pictures of a scene apart.
+    pub fn in_picture(world: &World, camera: &Camera, index: u64, error: f64, seed: u64) -> HeldOut {
+        let (width, height) = PICTURE;
+        let stream = 1 + index;
+        let pixel = |pixel: u32| {
+            let mut random = Random::new(seed, Purpose::HeldOutPoints, 1 + stream, u64::from(pixel));
+            let (points, _) = see_pixel(world, camera, width, height, pixel, 1, &mut random);
+            points.into_iter().map(|point| (point.surface, point.query))
+        };
+        let points: Vec<_> = (0..width * height).into_par_iter().flat_map_iter(pixel).collect();
+        HeldOut { truth: light(world, &points, stream, error, seed), points }
     }
 
     /// Paths from each point.
@@ -95,6 +103,27 @@ impl HeldOut {
     /// Whether any light arrives.
     pub fn is_lit(&self) -> bool {
         self.truth.iter().any(|light| light.mean.max_element() > 0.0)
+    }
+}
+
+/// The light at points, from so many paths that their noise leaves `error` certain. Points of other streams have others.
+fn light(world: &World, points: &[(SurfacePoint, QueryPoint)], stream: u64, error: f64, seed: u64) -> Vec<BlockMean> {
+    let keys = points.iter().map(|(surface, _)| world.places.key_of(surface)).collect();
+    let expected = world.expect(keys);
+    let path = PathSettings { expected: Some(&expected), ..PathSettings::default() };
+    let mut truth = vec![BlockMean::default(); points.len()];
+    let mut blocks = FIRST_BLOCKS;
+    loop {
+        truth.par_iter_mut().zip(points).enumerate().for_each(|(index, (light, (surface, query)))| {
+            for b in light.blocks..blocks {
+                let block = Block::new(seed, Purpose::HeldOutPaths, stream << 32 | index as u64, u64::from(b));
+                light.add(world, (surface, query), &path, &block);
+            }
+        });
+        if blocks >= MOST_BLOCKS || noise(&truth, error) <= NOISE_SHARE * error {
+            return truth;
+        }
+        blocks *= 2;
     }
 }
 

@@ -6,12 +6,14 @@ use std::time::Instant;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::align::Walls;
 use super::rule::{self, Choice, Next, Step};
 use crate::bake::{BakeError, Baked, Circumstances, Prepared, prepare};
 use crate::config::Config;
 use crate::light::World;
 use crate::probe::Grid;
 use crate::probe::file::{self, ProbeFile, SceneRecord};
+use crate::probe::lattice::Refine;
 use crate::probe::query::{Query, Visibility};
 use crate::report::error::sampled;
 use crate::report::target::{NextReport, NoiseReport, SeenReport, StepReport, StoppedBecause, TargetReport};
@@ -84,6 +86,8 @@ impl Search<'_, '_> {
             (relative(bounds.min), relative(bounds.max))
         });
         let held_out = HeldOut::new(self.world, bounds, self.error, self.circumstances.seed);
+        let points = held_out.points.iter().map(|(_, point)| (point.position.as_dvec3(), point.geometric.as_dvec3()));
+        let walls = Walls::of(&points.collect::<Vec<_>>());
         let first = self.first()?;
         let mut kept = self.judge(first, self.circumstances, &held_out, &prepared)?;
         step(&kept.report);
@@ -119,6 +123,7 @@ impl Search<'_, '_> {
                 Ok(choice) => choice,
                 Err(stop) => break stop,
             };
+            let choice = self.aligned(choice, &steps, &walls);
             let judged = match self.judge(choice, self.circumstances, &held_out, &prepared) {
                 Err(BakeError::Memory(error)) => break Stop::of(StoppedBecause::Memory, &error.to_string()),
                 judged => judged?,
@@ -231,6 +236,27 @@ impl Search<'_, '_> {
     fn probes(&self, choice: Choice) -> Result<u64, BakeError> {
         let config = self.config(choice);
         Ok(Grid::refined(&config.grid, config.placement.refine, self.world.scene)?.probe_count() as u64)
+    }
+
+    /// The same with a spacing that fits the walls better, unless a step has it already or it has too many probes.
+    fn aligned(&self, choice: Choice, steps: &[Step], walls: &Walls) -> Choice {
+        /// Spacings so near to each other are the same.
+        const SAME: f64 = 1.02;
+        let config = self.config(choice);
+        // Each mixed grid would be a tree of its own.
+        let is_uniform = config.placement.refine == Refine::default();
+        let Some(voxels) = config.store.occlusion.survey_voxels().filter(|_| is_uniform) else { return choice };
+        let lattice = |spacing_m: f64| {
+            let settings = self.config(Choice { spacing_m, ..choice }).grid;
+            let grid = Grid::refined(&settings, Refine::default(), self.world.scene).ok()?;
+            Some((grid.origin().as_dvec3(), grid.spacing().as_dvec3() / f64::from(voxels)))
+        };
+        let aligned = Choice { spacing_m: walls.aligned(choice.spacing_m, lattice), ..choice };
+        let is_new = |step: &Step| (step.spacing_m / aligned.spacing_m).ln().abs() > SAME.ln();
+        // Samples are raised at the spacing that there is.
+        let is_tried = steps.iter().any(|step| step.spacing_m == choice.spacing_m);
+        let fits = || self.probes(aligned).is_ok_and(|probes| self.is_allowed(probes, aligned.samples));
+        if !is_tried && steps.iter().all(is_new) && fits() { aligned } else { choice }
     }
 
     fn is_allowed(&self, probes: u64, samples: u32) -> bool {

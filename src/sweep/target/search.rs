@@ -359,9 +359,9 @@ fn most_samples(steps: &[Step]) -> u32 {
     steps.iter().map(|step| step.samples).max().unwrap_or(1)
 }
 
-/// Samples in words, which count as probes; nothing where they are those of the configuration.
+/// Samples in words; nothing where they are those of the configuration.
 fn times(samples: u32) -> String {
-    if samples > 1 { format!(" with {samples} × the samples, each time counted,") } else { String::new() }
+    if samples > 1 { format!(" with {samples} × the samples") } else { String::new() }
 }
 
 fn nothing_to_judge_by(held_out: &HeldOut) -> Stop {

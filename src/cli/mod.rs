@@ -144,8 +144,8 @@ pub struct BakeArgs {
     /// path tracing. Writes the smallest file that reaches E. Where none does, it writes the best, warns and says why.
     #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = parse_target_error)]
     pub target_error: Option<f64>,
-    /// Most probes of a grid that --target-error may choose.
-    #[arg(long, value_name = "N", default_value_t = 131_072, allow_negative_numbers = true, requires = "target_error", value_parser = clap::value_parser!(u64).range(1..=MAX_PROBES))]
+    /// Most probes of a grid that --target-error may choose, times its samples ÷ those of the configuration.
+    #[arg(long, value_name = "N", default_value_t = 32_768, allow_negative_numbers = true, requires = "target_error", value_parser = clap::value_parser!(u64).range(1..=MAX_PROBES))]
     pub max_probes: u64,
     /// Also write the report to this file.
     #[arg(long, value_name = "FILE.json")]

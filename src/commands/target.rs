@@ -10,7 +10,7 @@ use crate::config::Config;
 use crate::light::World;
 use crate::probe::transport::checkpoint;
 use crate::report::table::{Column, Table};
-use crate::report::target::{StepReport, StoppedBecause, TargetReport};
+use crate::report::target::{SeenReport, StepReport, StoppedBecause, TargetReport};
 use crate::sweep::target::search::{Found, Search};
 use crate::system::format;
 
@@ -138,8 +138,11 @@ pub fn summary(report: &TargetReport) -> String {
         )
     });
     let (points, paths) = (report.points, report.paths);
+    let of_camera = |seen: &SeenReport| format!("{} {}", seen.camera, error_in_words(seen.error, seen.standard_error));
+    let seen: Vec<String> = report.seen.iter().map(of_camera).collect();
+    let seen = if seen.is_empty() { String::new() } else { format!("\nover what cameras see: {}", seen.join(", ")) };
     format!(
-        "{table}\n{outcome}\njudged at {points} points of surfaces by {paths} paths each; all in {}{next}",
+        "{table}\n{outcome}{seen}\njudged at {points} points of surfaces by {paths} paths each; all in {}{next}",
         format::seconds(report.time_s)
     )
 }

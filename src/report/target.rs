@@ -12,9 +12,14 @@ pub struct TargetReport {
     pub standard_error: Option<f64>,
     /// Whether `reached` with its standard error is at most `error`.
     pub met: bool,
+    /// The same error over what each camera sees, as `error.nrmse` of `render`: surfaces count by the pixels they fill.
+    pub seen: Vec<SeenReport>,
     /// Points on surfaces that bakes were judged at, and paths from each for the truth.
     pub points: usize,
     pub paths: u32,
+    /// Bakes that may be made, without that for `noise`, and probes × `samples_factor` that each may have.
+    pub most_bakes: usize,
+    pub most_probes: u64,
     /// All bakes in their order.
     pub steps: Vec<StepReport>,
     /// Share of the first bake's error that its own random numbers have, from the same bake with another seed; `null` where
@@ -27,6 +32,14 @@ pub struct TargetReport {
     pub next: Option<NextReport>,
     /// Of points, truth and all bakes.
     pub time_s: f64,
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub struct SeenReport {
+    pub camera: String,
+    /// `null` where the camera sees no light.
+    pub error: Option<f64>,
+    pub standard_error: Option<f64>,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -62,7 +75,7 @@ pub struct NextReport {
 #[serde(rename_all = "snake_case")]
 pub enum StoppedBecause {
     Reached,
-    /// The next grid has more probes than allowed.
+    /// The next grid, or one that the error asks for at the pace so far, has more probes than allowed.
     Probes,
     /// The next bake needs more memory than there is.
     Memory,

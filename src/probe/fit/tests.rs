@@ -223,7 +223,7 @@ fn conjugate_gradients_reach_the_dense_solution() {
     let rows = rows_of(&volume, 400, |x, n| Vec3::new(1.0 + n.z, x.x.sin(), 3.0 * n.y * x.z));
     let factors = volume.irradiance.factors();
     let unknowns = 27 * 4;
-    let lambda: Vec<f64> = (0..unknowns).map(|i| 0.1 * (1 + i % 4) as f64).collect();
+    let lambda: Vec<f64> = (0..unknowns).map(|i| 0.2 * (1 + i % 3) as f64).collect();
     let rows = Rows::new(&factors, 27, 4, rows.into_iter());
     let prior = vec![Vec3A::new(0.5, 1.0, -1.0); unknowns];
     let task = solve::Task { rows: &rows, prior: &prior, lambda: lambda.clone(), iterations: 400 };
@@ -325,7 +325,7 @@ fn a_furnace_is_fitted_to_its_closed_form() {
     let world = World::new(&scene, 1.0, 0.999).unwrap();
     for store in [octahedral(4), harmonics(None, true)] {
         let mut volume = over(&scene, 0.7, &store);
-        let rows = RowSettings { lambda: 1e-5, paths: 32, ..RowSettings::default() };
+        let rows = RowSettings { rows_per_probe: 100, lambda: 1e-6, air: 0.3, paths: 32, ..RowSettings::default() };
         let figures = run(&Fit::Rows(rows), &world, &untested(), &mut volume, 1, |_| ()).unwrap();
         assert_eq!(figures.non_finite, 0);
         assert!(figures.held_out_before.unwrap() > 0.99, "{figures:?}");

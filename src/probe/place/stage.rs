@@ -37,7 +37,7 @@ pub fn place(world: &World, task: &PlacementTask, surveying: impl FnOnce()) -> P
         leave_unseen(&world.scene.mesh, grid, &mut placement, &table, settings.keep_unsampled);
         let (seen, rays) = air::seen(world, grid, &placement, &table);
         placement.rays += rays;
-        placement.regions = Some(Regions::new(grid, &table, &seen));
+        placement.regions = Some(Regions::new(grid, &table, &found.buried, &seen));
     }
     placement.survey = Some(table);
     placement

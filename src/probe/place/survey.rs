@@ -47,6 +47,8 @@ pub struct Survey {
     pub table: SurfaceVisibility,
     /// Per entry: whether the front of a surface, or a surface that has no back, faces there.
     pub fronts: Vec<bool>,
+    /// Per entry: whether it sees no probe and lies inside of a solid, as far as its points tell.
+    pub buried: Vec<bool>,
     pub rays: u64,
 }
 
@@ -107,6 +109,7 @@ struct Found {
     key: u16,
     mask: u8,
     is_front: bool,
+    is_buried: bool,
     /// Whether anything there asks: not the inside of a solid, nor a voxel that an edge merely touches.
     asks: bool,
     rays: u64,
@@ -202,7 +205,7 @@ impl<'a, 's> Surveyor<'a, 's> {
         let found: Vec<Found> =
             groups.into_par_iter().flat_map_iter(|group| looks(self, placement, group).map(|l| l.look())).collect();
         let mut table = SurfaceVisibility { voxels_per_cell: self.n, ..Default::default() };
-        let mut fronts = Vec::new();
+        let (mut fronts, mut buried) = (Vec::new(), Vec::new());
         let mut anew = found.iter().filter(|found| found.asks).peekable();
         for cell in self.grid.cells() {
             table.cell_start.push(table.keys.len() as u32);
@@ -210,16 +213,18 @@ impl<'a, 's> Surveyor<'a, 's> {
                 let range = known.table.range(cell);
                 table.keys.extend(&known.table.keys[range.clone()]);
                 table.masks.extend(&known.table.masks[range.clone()]);
-                fronts.extend(&known.fronts[range]);
+                fronts.extend(&known.fronts[range.clone()]);
+                buried.extend(&known.buried[range]);
             }
             while let Some(found) = anew.next_if(|found| found.cell == cell) {
                 table.keys.push(found.key);
                 table.masks.push(found.mask);
                 fronts.push(found.is_front);
+                buried.push(found.is_buried);
             }
         }
         table.cell_start.push(table.keys.len() as u32);
-        Survey { table, fronts, rays: found.iter().map(|found| found.rays).sum() }
+        Survey { table, fronts, buried, rays: found.iter().map(|found| found.rays).sum() }
     }
 }
 
@@ -258,7 +263,7 @@ impl Look<'_, '_> {
         // Backs of surfaces that have only fronts are asked for where nothing else is.
         let is_outside = |side: &Side| !side.is_back || world.scene.material(side.triangle).double_sided;
         let is_front = self.sides.iter().any(is_outside);
-        let mut found = Found { cell, key, mask: 0, is_front, asks: false, rays: 0 };
+        let mut found = Found { cell, key, mask: 0, is_front, is_buried: false, asks: false, rays: 0 };
         let active = active_corners(grid, &self.placement.states, cell);
         if active == 0 {
             return found;
@@ -279,18 +284,20 @@ impl Look<'_, '_> {
                 1 => (all(&|side| !is_outside(side), true), settings.first_points),
                 _ => (all(&|_| true, false), settings.first_points),
             };
+            found.asks |= tier == 0 && !pieces.is_empty();
             if pieces.is_empty() {
                 continue;
             }
             let tally = self.tally(&pieces, active, search, tier);
             found.rays += tally.rays;
-            found.asks |= tier == 0 && tally.is_open;
+            found.is_buried |= tier == 0 && !tally.is_open;
             if tally.points > 0 {
                 found.mask = tally.majority();
                 break;
             }
         }
         found.asks |= found.mask != 0;
+        found.is_buried &= found.mask == 0;
         found
     }
 

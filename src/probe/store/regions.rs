@@ -37,13 +37,14 @@ pub struct Regions {
 }
 
 impl Regions {
-    /// The trees of a table. Entries answer as they do there, the air about as `air` says: what the [`air_places`] of each cell
-    /// see, or nothing where that is not known.
-    pub fn new(grid: &Grid, table: &SurfaceVisibility, air: &[Vec<u8>]) -> Regions {
+    /// The trees of a table. Entries answer as they do there, but for those that see nothing and are `buried` inside of solids:
+    /// nothing asks these. The air answers about as `air` says: what the [`air_places`] of each cell see, or nothing where that
+    /// is not known.
+    pub fn new(grid: &Grid, table: &SurfaceVisibility, buried: &[bool], air: &[Vec<u8>]) -> Regions {
         let air = |cell: u32| air.get(cell as usize).map_or(&[][..], Vec::as_slice);
         let trees: Vec<Vec<u16>> = (0..grid.cell_count() as u32)
             .into_par_iter()
-            .map_init(grow::Grower::default, |grower, cell| grower.tree(table, CellIndex(cell), air(cell)))
+            .map_init(grow::Grower::default, |grower, cell| grower.tree(table, CellIndex(cell), buried, air(cell)))
             .collect();
         let (mut roots, mut words) = (Vec::with_capacity(trees.len()), Vec::new());
         let mut known: HashMap<Vec<u16>, u32> = HashMap::new();

@@ -7,12 +7,17 @@
 /// The error that a step is made for, as a share of what is asked for: the rest is for the standard error and for chance.
 const AIM: f64 = 0.9;
 
-/// Bounds of the exponent p, and what it is before two steps tell. Linear interpolation has 2, leaks at edges 1 or less.
-const EXPONENT: (f64, f64) = (0.7, 2.0);
+/// Bounds of the exponent p beyond the steps, and what it is before two steps tell. Linear interpolation has 2, leaks at edges
+/// 1 or less; what two steps make of it is uncertain.
+const EXPONENT: (f64, f64) = (0.7, 1.5);
+/// Bounds between two steps.
+const EXPONENT_BETWEEN: (f64, f64) = (0.5, 3.0);
 const FIRST_EXPONENT: f64 = 1.0;
 
 /// A step is no finer than this share of the spacing before: it has eight times the probes.
 pub const FINEST_STEP: f64 = 0.5;
+/// How far a spacing is foretold: thousands of times the probes are beyond any limit.
+const FARTHEST: f64 = 1.0 / 16.0;
 /// A step less fine than this would cost a bake and change little.
 pub const LEAST_STEP: f64 = 0.85;
 
@@ -27,13 +32,15 @@ const APART: f64 = 1.1;
 const NOISE_SHARE: f64 = 0.25;
 const MOST_SAMPLES: u32 = 16;
 
-/// The error falls if it becomes less than this share of the smallest before.
-const FALL: f64 = 0.97;
+/// The error falls if it does so at least by this exponent with the spacing, and at least to this share of the smallest
+/// before: at a smaller exponent, half the error takes 400 times the probes.
+const LEAST_EXPONENT: f64 = 0.35;
+const LEAST_FALL: f64 = 0.97;
 /// Steps that may fail to let it fall, one after another.
 const MOST_FLAT: usize = 2;
 
 /// Bakes at most, without that with another seed.
-const MOST_STEPS: usize = 8;
+pub const MOST_STEPS: usize = 8;
 
 /// Digits of a spacing that was chosen.
 const DIGITS: i32 = 3;
@@ -123,6 +130,18 @@ pub fn finer(steps: &[Step], error: f64, noise: Option<f64>) -> Choice {
     Choice { spacing_m: rounded_up(factor * finest.spacing_m), samples }
 }
 
+/// The bake that the model says to have the error that is aimed at, by [`FARTHEST`] finer at most; `None` before two spacings
+/// tell the pace.
+pub fn wanted(steps: &[Step], error: f64, noise: Option<f64>) -> Option<Choice> {
+    let finest = finest(steps)?;
+    steps.iter().find(|step| step.spacing_m > finest.spacing_m)?;
+    let next = finer(steps, error, noise);
+    let (noise, aim) = (noise.unwrap_or(0.0), AIM * error);
+    let left = (aim * aim - noise * noise / f64::from(next.samples)).max(0.25 * aim * aim).sqrt();
+    let factor = (left / finest.of_grid(noise)).powf(1.0 / exponent(steps, noise)).clamp(FARTHEST, 1.0);
+    Some(Choice { spacing_m: rounded_up(factor * finest.spacing_m), samples: next.samples })
+}
+
 /// The error that the model foretells of a bake, from one of the steps.
 pub fn predicted(steps: &[Step], from: &Step, choice: &Choice, noise: Option<f64>) -> f64 {
     let noise = noise.unwrap_or(0.0);
@@ -144,7 +163,7 @@ fn coarser(steps: &[Step], met: &Step, error: f64) -> Option<Choice> {
     }
     let too_coarse = steps.iter().filter(|s| s.spacing_m > met.spacing_m && !s.meets(error));
     let too_coarse = too_coarse.min_by(|a, b| a.spacing_m.total_cmp(&b.spacing_m));
-    let p = too_coarse.map_or(FIRST_EXPONENT, |other| between(met, other, 0.0));
+    let p = too_coarse.map_or(FIRST_EXPONENT, |other| between(met, other, 0.0, EXPONENT_BETWEEN));
     let factor = (AIM * error / met.error.max(f64::MIN_POSITIVE)).powf(1.0 / p).min(1.0 / FINEST_STEP);
     let most = too_coarse.map_or(f64::INFINITY, |other| other.spacing_m / APART);
     let spacing_m = rounded_up(factor * met.spacing_m);
@@ -155,8 +174,11 @@ fn coarser(steps: &[Step], met: &Step, error: f64) -> Option<Choice> {
 /// Whether the last steps have not let the error fall.
 fn is_flat(steps: &[Step]) -> bool {
     let Some(last) = steps.len().checked_sub(MOST_FLAT).filter(|&before| before > 0) else { return false };
-    let least = |steps: &[Step]| steps.iter().map(|s| s.error).fold(f64::INFINITY, f64::min);
-    least(&steps[last..]) > FALL * least(&steps[..last])
+    let (before, after) = steps.split_at(last);
+    let least = |steps: &[Step]| steps.iter().copied().min_by(|a, b| a.error.total_cmp(&b.error));
+    let (Some(before), Some(after)) = (least(before), least(after)) else { return false };
+    let wanted = (after.spacing_m / before.spacing_m).powf(LEAST_EXPONENT).min(LEAST_FALL);
+    after.error > wanted * before.error
 }
 
 /// The finest; of several the last.
@@ -169,13 +191,13 @@ fn exponent(steps: &[Step], noise: f64) -> f64 {
     let Some(finest) = finest(steps) else { return FIRST_EXPONENT };
     let coarser = steps.iter().filter(|s| s.spacing_m > finest.spacing_m);
     let next = coarser.min_by(|a, b| a.spacing_m.total_cmp(&b.spacing_m));
-    next.map_or(FIRST_EXPONENT, |next| between(finest, next, noise))
+    next.map_or(FIRST_EXPONENT, |next| between(finest, next, noise, EXPONENT))
 }
 
-fn between(fine: &Step, coarse: &Step, noise: f64) -> f64 {
+fn between(fine: &Step, coarse: &Step, noise: f64, (least, most): (f64, f64)) -> f64 {
     let p = (coarse.of_grid(noise) / fine.of_grid(noise)).ln() / (coarse.spacing_m / fine.spacing_m).ln();
     // Errors of 0 tell nothing.
-    if p.is_finite() { p.clamp(EXPONENT.0, EXPONENT.1) } else { FIRST_EXPONENT }
+    if p.is_finite() { p.clamp(least, most) } else { FIRST_EXPONENT }
 }
 
 /// With few digits, and never finer.
@@ -280,6 +302,17 @@ mod tests {
         let (steps, end) = Scene { at_one: 0.3, p: 1.0, noise: 0.2 }.search(1e-6);
         assert!(matches!(end, Next::Steps | Next::NotFalling), "{end:?}");
         assert!(steps.len() <= MOST_STEPS);
+    }
+
+    #[test]
+    fn what_an_error_takes_follows_from_the_pace() {
+        let scene = Scene { at_one: 0.4, p: 1.0, noise: 0.0 };
+        let mut steps = vec![scene.bake(Choice { spacing_m: 1.0, samples: 1 })];
+        assert_eq!(wanted(&steps, 0.02, None), None);
+        steps.push(scene.bake(Choice { spacing_m: 0.5, samples: 1 }));
+        // 0.4·s = 0.018.
+        assert_eq!(wanted(&steps, 0.02, None), Some(Choice { spacing_m: 0.045, samples: 1 }));
+        assert_eq!(wanted(&steps, 0.002, None), Some(Choice { spacing_m: 0.0313, samples: 1 }));
     }
 
     #[test]

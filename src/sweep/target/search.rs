@@ -6,17 +6,24 @@ use std::time::Instant;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::align::Walls;
 use super::rule::{self, Choice, Next, Step};
 use crate::bake::{BakeError, Baked, Circumstances, Prepared, prepare};
 use crate::config::Config;
 use crate::light::World;
 use crate::probe::Grid;
-use crate::probe::file::{self, SceneRecord};
+use crate::probe::file::{self, ProbeFile, SceneRecord};
+use crate::probe::lattice::Refine;
 use crate::probe::query::{Query, Visibility};
 use crate::report::error::sampled;
-use crate::report::target::{NextReport, NoiseReport, StepReport, StoppedBecause, TargetReport};
+use crate::report::target::{NextReport, NoiseReport, SeenReport, StepReport, StoppedBecause, TargetReport};
+use crate::scene::Camera;
+use crate::shade::framing::frame;
 use crate::shade::held_out::HeldOut;
 use crate::system::format;
+
+/// Cameras whose pictures are judged, the first of a scene.
+const MOST_CAMERAS: usize = 8;
 
 /// What a search works on.
 pub struct Search<'a, 's> {
@@ -29,6 +36,7 @@ pub struct Search<'a, 's> {
     pub output: &'a Path,
     /// Relative error that is asked for.
     pub error: f64,
+    /// Probes × samples ÷ those of the configuration that a bake may have: what bounds the time.
     pub most_probes: u64,
 }
 
@@ -78,6 +86,8 @@ impl Search<'_, '_> {
             (relative(bounds.min), relative(bounds.max))
         });
         let held_out = HeldOut::new(self.world, bounds, self.error, self.circumstances.seed);
+        let points = held_out.points.iter().map(|(_, point)| (point.position.as_dvec3(), point.geometric.as_dvec3()));
+        let walls = Walls::of(&points.collect::<Vec<_>>());
         let first = self.first()?;
         let mut kept = self.judge(first, self.circumstances, &held_out, &prepared)?;
         step(&kept.report);
@@ -106,10 +116,14 @@ impl Search<'_, '_> {
             } else {
                 choice
             };
+            if let Some(stop) = self.hopeless(&steps, noise.map(|n| n.error)).filter(|_| is_finer) {
+                break stop;
+            }
             let choice = match self.within_limit(choice, &steps) {
                 Ok(choice) => choice,
                 Err(stop) => break stop,
             };
+            let choice = self.aligned(choice, &steps, &walls);
             let judged = match self.judge(choice, self.circumstances, &held_out, &prepared) {
                 Err(BakeError::Memory(error)) => break Stop::of(StoppedBecause::Memory, &error.to_string()),
                 judged => judged?,
@@ -128,8 +142,11 @@ impl Search<'_, '_> {
             reached: error,
             standard_error,
             met: measured(&kept.report).is_some_and(|step| step.meets(self.error)),
+            seen: self.seen(&kept)?,
             points: held_out.points.len(),
             paths: held_out.paths(),
+            most_bakes: rule::MOST_STEPS,
+            most_probes: self.most_probes,
             steps: reports,
             noise,
             stopped_because: stop.because,
@@ -161,21 +178,49 @@ impl Search<'_, '_> {
         let baked = bake.bake(circumstances, self.scene)?;
         let time_s = started.elapsed().as_secs_f64();
         let file = file::as_read(&baked.container, self.output)?;
-        let volume = file.volume_as_planned(self.world.scene.origin_world);
-        let query = Query { volume: &volume, settings: &file.query.weights };
-        let ask = |(_, point): &(_, _)| query.irradiance(point, Visibility::Stored);
-        let found: Vec<Vec3> = held_out.points.par_iter().map(ask).collect();
+        let found = self.ask(&file, held_out);
         let error = sampled::relative(&found, &held_out.truth);
         let report = StepReport {
             spacing_m: choice.spacing_m,
             samples_factor: choice.samples,
-            probes: volume.states.len(),
+            probes: file.volume_in_grid().states.len(),
             error: error.map(|(error, _)| error),
             standard_error: error.map(|(_, standard_error)| standard_error),
             bytes: file.file_bytes,
             time_s,
         };
         Ok(Judged { config, baked, found, report })
+    }
+
+    /// Look-ups of the file at the points.
+    fn ask(&self, file: &ProbeFile, held_out: &HeldOut) -> Vec<Vec3> {
+        let volume = file.volume_as_planned(self.world.scene.origin_world);
+        let query = Query { volume: &volume, settings: &file.query.weights };
+        let ask = |(_, point): &(_, _)| query.irradiance(point, Visibility::Stored);
+        held_out.points.par_iter().map(ask).collect()
+    }
+
+    /// The error over what cameras see; nothing where there is no light to judge by.
+    fn seen(&self, kept: &Judged) -> Result<Vec<SeenReport>, BakeError> {
+        let (world, seed) = (self.world, self.circumstances.seed);
+        if kept.report.error.is_none() {
+            return Ok(Vec::new());
+        }
+        let file = file::as_read(&kept.baked.container, self.output)?;
+        let of_camera = |(index, camera): (usize, &Camera)| {
+            let picture = HeldOut::in_picture(world, camera, index as u64, self.error, seed);
+            let error = sampled::relative(&self.ask(&file, &picture), &picture.truth);
+            SeenReport {
+                camera: camera.name.clone(),
+                error: error.map(|(error, _)| error),
+                standard_error: error.map(|(_, standard_error)| standard_error),
+            }
+        };
+        let framed = match (world.scene.cameras.is_empty(), world.scene.mesh.bounds()) {
+            (true, Some(bounds)) => vec![frame(world, bounds).0],
+            _ => Vec::new(),
+        };
+        Ok(framed.iter().chain(&world.scene.cameras).take(MOST_CAMERAS).enumerate().map(of_camera).collect())
     }
 
     /// What random numbers of the bake add to its error: half of the squared difference from the same bake by others.
@@ -191,6 +236,49 @@ impl Search<'_, '_> {
     fn probes(&self, choice: Choice) -> Result<u64, BakeError> {
         let config = self.config(choice);
         Ok(Grid::refined(&config.grid, config.placement.refine, self.world.scene)?.probe_count() as u64)
+    }
+
+    /// The same with a spacing that fits the walls better, unless a step has it already or it has too many probes.
+    fn aligned(&self, choice: Choice, steps: &[Step], walls: &Walls) -> Choice {
+        /// Spacings so near to each other are the same.
+        const SAME: f64 = 1.02;
+        let config = self.config(choice);
+        // Each mixed grid would be a tree of its own.
+        let is_uniform = config.placement.refine == Refine::default();
+        let Some(voxels) = config.store.occlusion.survey_voxels().filter(|_| is_uniform) else { return choice };
+        let lattice = |spacing_m: f64| {
+            let settings = self.config(Choice { spacing_m, ..choice }).grid;
+            let grid = Grid::refined(&settings, Refine::default(), self.world.scene).ok()?;
+            Some((grid.origin().as_dvec3(), grid.spacing().as_dvec3() / f64::from(voxels)))
+        };
+        let aligned = Choice { spacing_m: walls.aligned(choice.spacing_m, lattice), ..choice };
+        let is_new = |step: &Step| (step.spacing_m / aligned.spacing_m).ln().abs() > SAME.ln();
+        // Samples are raised at the spacing that there is.
+        let is_tried = steps.iter().any(|step| step.spacing_m == choice.spacing_m);
+        let fits = || self.probes(aligned).is_ok_and(|probes| self.is_allowed(probes, aligned.samples));
+        if !is_tried && steps.iter().all(is_new) && fits() { aligned } else { choice }
+    }
+
+    fn is_allowed(&self, probes: u64, samples: u32) -> bool {
+        probes.saturating_mul(u64::from(samples)) <= self.most_probes
+    }
+
+    /// Whether the error takes a grid beyond the limit, at the pace of the errors so far: finer bakes would only cost.
+    fn hopeless(&self, steps: &[Step], noise: Option<f64>) -> Option<Stop> {
+        let wanted = rule::wanted(steps, self.error, noise)?;
+        let samples = most_samples(steps);
+        let probes = self.probes(wanted);
+        if probes.as_ref().is_ok_and(|&probes| self.is_allowed(probes, samples)) {
+            return None;
+        }
+        let (asked, spacing_m) = (format::percent(self.error), format::significant(wanted.spacing_m, 3));
+        let many = probes.map_or_else(|error| error.to_string(), |probes| format!("{probes} probes"));
+        let (times, most) = (times(samples), self.most_probes);
+        let what = format!(
+            "at the pace of the errors so far {asked} takes a grid of {spacing_m} m or finer{times}, {many}: beyond {most} \
+             (--max-probes)"
+        );
+        Some(Stop::of(StoppedBecause::Probes, &what))
     }
 
     /// The spacing that is there; where it has more probes than allowed, one larger.
@@ -217,18 +305,24 @@ impl Search<'_, '_> {
         /// Spacings that are tried are so far apart.
         const RATIO: f64 = 1.05;
         let finest = steps.iter().map(|s| s.spacing_m).fold(f64::INFINITY, f64::min);
+        let samples = most_samples(steps);
         let mut tried = choice;
         loop {
             let probes = self.probes(tried);
-            if probes.as_ref().is_ok_and(|&probes| probes <= self.most_probes) {
+            if probes.as_ref().is_ok_and(|&probes| self.is_allowed(probes, tried.samples)) {
                 return Ok(tried);
             }
-            tried.spacing_m = rule::rounded_up(tried.spacing_m * RATIO);
-            if tried.spacing_m > rule::LEAST_STEP * finest {
-                let spacing_m = format::significant(choice.spacing_m, 3);
+            // Chance is the lesser part of most errors.
+            if tried.samples > samples {
+                tried.samples = (tried.samples / 2).max(samples);
+            } else {
+                tried.spacing_m = rule::rounded_up(tried.spacing_m * RATIO);
+            }
+            if tried.samples <= samples && tried.spacing_m > rule::LEAST_STEP * finest {
+                let (spacing_m, times) = (format::significant(choice.spacing_m, 3), times(samples));
                 let what = match probes {
                     Ok(_) => {
-                        format!("a grid of {spacing_m} m has more than {} probes (--max-probes)", self.most_probes)
+                        format!("a grid of {spacing_m} m{times} is beyond {} probes (--max-probes)", self.most_probes)
                     }
                     Err(error) => error.to_string(),
                 };
@@ -258,6 +352,16 @@ impl Stop {
     fn of(because: StoppedBecause, message: &str) -> Stop {
         Stop { because, message: message.to_owned() }
     }
+}
+
+/// The most samples of all steps.
+fn most_samples(steps: &[Step]) -> u32 {
+    steps.iter().map(|step| step.samples).max().unwrap_or(1)
+}
+
+/// Samples in words; nothing where they are those of the configuration.
+fn times(samples: u32) -> String {
+    if samples > 1 { format!(" with {samples} × the samples") } else { String::new() }
 }
 
 fn nothing_to_judge_by(held_out: &HeldOut) -> Stop {

@@ -59,10 +59,9 @@ pub struct Grower {
 
 impl Grower {
     /// A cell's tree. `air` is what each of its [`air_places`] sees, or empty.
-    pub fn tree(&mut self, table: &SurfaceVisibility, cell: CellIndex, air: &[u8]) -> Vec<u16> {
+    pub fn tree(&mut self, table: &SurfaceVisibility, cell: CellIndex, buried: &[bool], air: &[u8]) -> Vec<u16> {
         let mut words = Vec::new();
-        let entries: Vec<Entry> = table.entries(cell).collect();
-        if entries.is_empty() {
+        if table.range(cell).is_empty() {
             // Where no surface is known everything is seen.
             words.push(LEAF | LOW);
             return words;
@@ -71,10 +70,13 @@ impl Grower {
         self.samples.clear();
         self.is_known.clear();
         self.is_known.resize(n.pow(3) as usize * 6, false);
-        for entry in &entries {
-            let facing = Facing::of(entry.facing);
+        for entry in table.entries(cell) {
+            let (facing, answer) = (Facing::of(entry.facing), answer(table, &entry));
+            if answer == NOTHING && buried[entry.index] {
+                continue;
+            }
             self.is_known[Self::place(n, entry.voxel, facing)] = true;
-            self.add(entry.voxel, facing, answer(table, entry), true);
+            self.add(entry.voxel, facing, answer, true);
         }
         // Who sees none of the eight is inside of something, or cannot be helped.
         for (place, &mask) in air_places(n).zip(air).filter(|(_, mask)| **mask != 0) {
@@ -85,7 +87,11 @@ impl Grower {
                 }
             }
         }
-        grow(&mut self.samples, &mut words);
+        if self.samples.is_empty() {
+            words.push(LEAF);
+        } else {
+            grow(&mut self.samples, &mut words);
+        }
         words
     }
 

@@ -33,6 +33,15 @@ fn table(n: u32, share: f32, masks: &[u8], seed: u64) -> SurfaceVisibility {
     table
 }
 
+/// None of whose entries is inside of a solid.
+fn open(table: &SurfaceVisibility) -> Vec<bool> {
+    vec![false; table.keys.len()]
+}
+
+fn whole(table: &SurfaceVisibility) -> Regions {
+    Regions::new(&grid(), table, &open(table), &[])
+}
+
 #[test]
 fn entries_answer_as_in_the_table() {
     let grid = grid();
@@ -46,7 +55,7 @@ fn entries_answer_as_in_the_table() {
         let mut random = Random::new(seed, Purpose::FitPoints, 1, 0);
         // Whatever the air sees.
         let air: Vec<u8> = air_places(n).map(|_| random.bits() as u8).collect();
-        let regions = Regions::new(&grid, &table, &[air]);
+        let regions = Regions::new(&grid, &table, &open(&table), &[air]);
         let mut asked = 0;
         for entry in table.entries(CellIndex(0)) {
             for _ in 0..8 {
@@ -77,7 +86,7 @@ fn parts_reach_between_the_surfaces_and_empty_cells_see_all() {
     entries.sort_unstable();
     let (keys, masks) = entries.into_iter().unzip();
     let table = SurfaceVisibility { voxels_per_cell: n, cell_start: vec![0, 64, 64], keys, masks, far: Vec::new() };
-    let (grid, regions) = (grid(), Regions::new(&grid(), &table, &[]));
+    let (grid, regions) = (grid(), whole(&table));
     let mask = |at: [f32; 3], facing: Vec3| {
         let at = Vec3::from(at);
         regions.look_up(&grid, &grid.cell(at), at, Facing::of(facing)).mask
@@ -104,7 +113,7 @@ fn the_air_answers_as_it_sees_up_to_the_surfaces() {
     let table = SurfaceVisibility { voxels_per_cell: n, cell_start: vec![0, 64, 64], keys, masks, far: Vec::new() };
     let seen = |place: Vec3| if place.y < 0.5 { 0x33 } else { 0xff };
     let (grid, air) = (grid(), air_places(n).map(seen).collect());
-    let regions = Regions::new(&grid, &table, &[air]);
+    let regions = Regions::new(&grid, &table, &open(&table), &[air]);
     let ask = |at: [f32; 3], facing: Vec3| {
         let at = Vec3::from(at);
         regions.look_up(&grid, &grid.cell(at), at, Facing::of(facing)).mask
@@ -117,6 +126,11 @@ fn the_air_answers_as_it_sees_up_to_the_surfaces() {
     assert_eq!(ask([3.9 / 8.0, 0.9 / 8.0, 3.5 / 8.0], Vec3::Y), 0);
     assert_eq!(ask([4.1 / 8.0, 0.5 / 8.0, 3.5 / 8.0], Vec3::Y), 0x33);
     assert_eq!(ask([3.5 / 8.0, 1.1 / 8.0, 3.5 / 8.0], Vec3::Y), 0x33);
+    // Inside of a solid it is none at all.
+    let buried: Vec<bool> = table.masks.iter().map(|mask| *mask == 0).collect();
+    let air = air_places(n).map(seen).collect();
+    let regions = Regions::new(&grid, &table, &buried, &[air]);
+    assert_eq!(regions.parts(), 2);
 }
 
 #[test]
@@ -134,7 +148,7 @@ fn where_the_air_sees_otherwise_than_a_surface_it_does_so_up_to_that_surface() {
         };
         let seen = |place: Vec3| if place.x * 8.0 < wall as f32 { 0x55 } else { 0xaa };
         let (grid, air) = (grid(), air_places(n).map(seen).collect());
-        let regions = Regions::new(&grid, &table, &[air]);
+        let regions = Regions::new(&grid, &table, &open(&table), &[air]);
         for x in 0..n {
             let at = Vec3::new((x as f32 + 0.5) / 8.0, 0.4, 0.4);
             let expected = if x < wall && wall > 1 { 0x55 } else { 0xaa };
@@ -152,12 +166,12 @@ fn cells_that_see_alike_share_a_tree() {
         masks: vec![9, 9],
         far: Vec::new(),
     };
-    assert_eq!(Regions::new(&grid(), &table, &[]).bytes(), 2 * 4 + 2);
+    assert_eq!(whole(&table).bytes(), 2 * 4 + 2);
 }
 
 #[test]
 fn trees_come_back_from_the_file_and_damaged_ones_do_not() {
-    let regions = Regions::new(&grid(), &table(22, 0.3, &[1, 2, 3, 4, 5, 0], 5), &[]);
+    let regions = whole(&table(22, 0.3, &[1, 2, 3, 4, 5, 0], 5));
     // Some need more than eight bits from one part to the other.
     assert!(regions.words.len() > 1000 && regions.words[0] & LOW == 0);
     let written = |change: &dyn Fn(&mut Regions)| {

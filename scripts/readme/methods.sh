@@ -9,7 +9,10 @@ usage="usage: scripts/readme/methods.sh [--tables]
 Sets up, builds, and sweeps all presets over each scene, in these parts:
 
   positions  the same bounds and spacing for all methods
-  bytes      as many probes as fit into the bytes that the preset physical needs there; wants 'positions' first
+  bytes      as many probes as fit into twice the bytes that the default needs there, methods of more than 8 KiB a probe with
+             smaller maps; wants 'positions' first
+  offsets    the default and the two published methods that err least in 'bytes', on five shifted grids; wants 'bytes' first
+  ablation   the default without each of its ingredients
   curves     a ladder of spacings, for error against bake time and against shading time
   mixed      the mixed grid against the uniform one at the same finest spacing
 
@@ -43,7 +46,7 @@ export LIGHTPROBE=$lightprobe
 size=${SIZE:-192x108}
 spp=${SPP:-512}
 read -ra scenes <<<"${SCENES:-$(python3 "$methods" scenes)}"
-read -ra parts <<<"${PARTS:-positions bytes curves mixed}"
+read -ra parts <<<"${PARTS:-positions bytes offsets ablation curves mixed}"
 
 # One part of a scene; its runs lie beside the scene's other parts, which share some of them.
 sweep() { # SCENE PART

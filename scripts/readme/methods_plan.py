@@ -25,6 +25,7 @@ SCENES = {
     "cornell": {"spacing": 0.25, "curve": [1.0, 0.7, 0.5, 0.35, 0.25, 0.18]},
     "courtyard": {"spacing": 2.0, "curve": [8.0, 5.6, 4.0, 2.8, 2.0, 1.4]},
     "office": {"spacing": 1.0, "mixed": 0.35},
+    "glossy_room": {"spacing": 0.75},
     "veach_ajar": {"file": f"{SHARED}/scenes/veach_ajar/veach_ajar.glb", "spacing": 0.7},
     "bathroom": {
         "file": f"{SHARED}/scenes/bathroom/LAZIENKA.gltf",
@@ -38,6 +39,39 @@ SCENES = {
 # Where a method at its published resolution would need more than 60 GB or 20 minutes of a core: settings instead.
 # (scene, part, preset): settings. Rows made with them are called scaled.
 SCALED = {}
+
+# What methods of more than 8 KiB a probe are scaled to where bytes are compared: texels along a side of all their maps.
+MAPS = (16, 32, 64)
+
+
+def scaled_maps(preset, texels):
+    of_preset = {
+        "irradiance-2022": ["store.prefiltered=[]"],
+        "lightfield-2022": [f"store.occlusion.moments.resolution={texels}", "store.layout.published=None"],
+    }
+    return [
+        f"capture.rays.cube.face={2 * texels}",
+        f"capture.rays.cube.resolution={texels}",
+        f"store.irradiance.octahedral.resolution={texels}",
+        *of_preset[preset],
+    ]
+
+
+# Ingredients of the default, each taken away or made another: name, settings.
+ABLATION = [
+    ("no fit", ["fit=none"]),
+    ("a quarter of the rows", ["fit.rows.rows_per_probe=19"]),
+    ("4 paths a row", ["fit.rows.paths=4"]),
+    ("no rows with bent normals", ["fit.rows.bent=0"]),
+    ("no rows in the air", ["fit.rows.air=0"]),
+    ("10 × as firm (lambda)", ["fit.rows.lambda=0.3"]),
+    ("no gradients", ["store.irradiance.sh9.gradient=false"]),
+    ("maps of 8² texels", ["store.irradiance=octahedral(resolution: 8)"]),
+    ("no visibility", ["store.occlusion=none"]),
+    ("8 voxels a cell", ["store.occlusion.surface.voxels_per_cell=8"]),
+    ("no floor under sums", ["query.sum_floor=0"]),
+    ("captures of 32² rays, guided", ["capture.rays=octahedral(resolution: 32, per_texel: 1, guided: 1.25)"]),
+]
 
 # The grid of `mixed` has so many probes that all methods there see faces of 32² instead of 64².
 MIXED_FACES = "capture.rays.cube.face=32"
@@ -115,22 +149,69 @@ def mixed(scene):
     return entries
 
 
-def bytes_(scene):
-    """Grids on which every method has about the bytes that `physical` has at the scene's own spacing."""
-    report = sweep_of(scene, "positions")
+def rows_of(scene, part):
+    report = sweep_of(scene, part)
     if report is None:
-        sys.exit(f"{scene}: there is no out/methods/{scene}/positions/sweep.json; run the part 'positions' first")
-    rows = {row["label"].split(",")[0]: row for row in report["configurations"]}
-    budget = typical(rows["physical"], "bytes")
-    entries = [ladder(scene, "bytes", "physical", "physical", at_spacing(spacing_of(scene)))]
-    for preset in PRESETS[1:]:
-        probes = budget / typical(rows[preset], "bytes_per_probe")
-        if preset == "threev8-mixed":
-            grid = at_spacing(fitted_spacing(scene, probes, rows[preset]["probes"]))
-        else:
-            grid = ["grid.spacing_m=None", f"grid.divisions={fitted_divisions(extent(scene), probes)}"]
-        entries.append(ladder(scene, "bytes", preset, preset, grid))
+        sys.exit(f"{scene}: there is no out/methods/{scene}/{part}/sweep.json; run the part '{part}' first")
+    return {row["label"]: row for row in report["configurations"]}
+
+
+def bytes_(scene):
+    """Grids on which every other method has up to twice the bytes that the default has at the scene's own spacing, and those of
+    twice that spacing where they have no more."""
+    own = spacing_of(scene)
+    budget = 2 * typical(rows_of(scene, "positions")["default"], "bytes")
+    entries = [ladder(scene, "bytes", "default", "default", at_spacing(own))]
+    for preset in (preset for preset in PRESETS if preset != "default"):
+        large = [(f"{preset}, scaled to {n}²", scaled_maps(preset, n)) for n in MAPS] if preset in LARGE else []
+        for name, settings in large or [(preset, [])]:
+            few = ["grid.spacing_m=None", "grid.divisions=(2,2,2)", *settings]
+            # A few per cent less than twice: probes come in whole planes.
+            probes = 0.97 * budget / probe_bytes(scene, preset, few)
+            if probes < 8:
+                continue
+            if preset == "threev8-mixed":
+                grid = at_spacing(fitted_spacing(scene, probes, count(scene, preset, at_spacing(own))))
+            else:
+                grid = ["grid.spacing_m=None", f"grid.divisions={fitted_divisions(extent(scene), probes)}"]
+            entries.append(ladder(scene, "bytes", name, preset, [*settings, *grid]))
+            double = at_spacing(2 * own)
+            if count(scene, preset, double) <= probes:
+                entries.append(ladder(scene, "bytes", f"{name}, spacing × 2", preset, [*settings, *double]))
     return entries
+
+
+def probe_bytes(scene, preset, settings):
+    words = [word for text in settings for word in ("--set", text)]
+    report = json.loads(bake(scene, "--preset", preset, *words, "-o", str(WORK / scene / "few.probes"), "--json"))
+    return report["bytes_per_probe"]["runtime_kept"]
+
+
+def count(scene, preset, settings):
+    words = [word for text in [*settings, "capture.rays.cube.face=1"] for word in ("--set", text)]
+    words = words if "cube" in preset_text(preset) else words[:-2]
+    return json.loads(bake(scene, "--preset", preset, *words, "--dry-run", "--json"))["probes"]
+
+
+def preset_text(preset):
+    return (ROOT / "configs" / "presets" / f"{preset}.ron").read_text(encoding="utf-8")
+
+
+def offsets(scene):
+    """The default and the two published methods that err least there, of the parts `positions` and `bytes`, on shifted grids."""
+    entries = [ladder(scene, "offsets", "default", "default", at_spacing(spacing_of(scene)))]
+    text = (WORK / scene / "bytes" / "ladder.ron").read_text(encoding="utf-8").splitlines(keepends=True)
+    rows = rows_of(scene, "bytes")
+    published = [rows[label] for label in rows if label.split(",")[0] not in ("default", "physical")]
+    for row in sorted(published, key=lambda row: typical(row, "error_relative"))[:2]:
+        entries += [line for line in text if f'name: "{row["label"]}"' in line]
+    return entries
+
+
+def ablation(scene):
+    own = at_spacing(spacing_of(scene))
+    entries = [ladder(scene, "ablation", "default", "default", own)]
+    return entries + [ladder(scene, "ablation", name, "default", [*own, *change]) for name, change in ABLATION]
 
 
 def bake(scene, *words):
@@ -179,20 +260,26 @@ def fitted_spacing(scene, probes, known):
     low, high = middle - 1, middle + 1
     for _ in range(10):
         spacing = float(f"{math.exp((low + high) / 2):.4g}")
-        settings = [f"grid.spacing_m={spacing}", "capture.rays.cube.face=1"]
-        words = [word for text in settings for word in ("--set", text)]
-        count = json.loads(bake(scene, "--preset", "threev8-mixed", *words, "--dry-run", "--json"))["probes"]
-        off = abs(math.log(count / probes))
+        found = count(scene, "threev8-mixed", at_spacing(spacing))
+        off = abs(math.log(found / probes))
         if best is None or off < best[0]:
             best = off, spacing
-        if count > probes:
+        if found > probes:
             low = math.log(spacing)
         else:
             high = math.log(spacing)
     return best[1]
 
 
-PARTS = {"positions": positions, "bytes": bytes_, "curves": curves, "mixed": mixed}
+PARTS = {
+    "positions": positions,
+    "bytes": bytes_,
+    "offsets": offsets,
+    "ablation": ablation,
+    "curves": curves,
+    "mixed": mixed,
+}
+WORDS = {"positions": ["--equal", "positions"], "offsets": ["--offsets", "5"], "curves": ["--equal", "bytes"]}
 
 
 def prepare(scene, part):
@@ -204,7 +291,7 @@ def prepare(scene, part):
     (folder / "ladder.ron").write_text("(\n    ladders: [\n" + "".join(entries) + "    ],\n)\n", encoding="utf-8")
     (WORK / scene / "machine.txt").write_text(machine(), encoding="utf-8")
     words = [file_of(scene), *SCENES[scene].get("words", [])]
-    words += {"positions": ["--equal", "positions"], "curves": ["--equal", "bytes"]}.get(part, [])
+    words += WORDS.get(part, [])
     print("\n".join(words))
 
 

@@ -16,6 +16,7 @@ import sys
 sys.dont_write_bytecode = True
 
 from methods_plan import PARTS, ROOT, SCENES, WORK, file_of, prepare  # noqa: E402
+from methods_judged import ablation_table, judged_table, offsets_table  # noqa: E402
 from methods_rooms import rooms_table  # noqa: E402
 from methods_tables import at_budgets, full_tables, markdown, mixed_table, short_table  # noqa: E402
 
@@ -53,6 +54,9 @@ def sections(scenes):
         ("short", short_table(scenes) + picture),
         ("positions", full_tables("positions", scenes)),
         ("bytes", full_tables("bytes", scenes)),
+        ("judged", judged_table(scenes)),
+        ("offsets", offsets_table(scenes)),
+        ("ablation", ablation_table(scenes)),
         ("curves", curves_table()),
         ("budgets", at_budgets(scenes)),
         ("mixed", mixed_table(scenes)),

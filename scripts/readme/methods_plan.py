@@ -67,7 +67,7 @@ ABLATION = [
     ("10 × as firm (lambda)", ["fit.rows.lambda=0.3"]),
     ("no gradients", ["store.irradiance.sh9.gradient=false"]),
     ("maps of 8² texels", ["store.irradiance=octahedral(resolution: 8)"]),
-    ("no visibility", ["store.occlusion=none"]),
+    ("no visibility", ["store.occlusion=none", "query.test=none"]),
     ("8 voxels a cell", ["store.occlusion.surface.voxels_per_cell=8"]),
     ("no floor under sums", ["query.sum_floor=0"]),
     ("captures of 32² rays, guided", ["capture.rays=octahedral(resolution: 32, per_texel: 1, guided: 1.25)"]),
@@ -188,13 +188,8 @@ def probe_bytes(scene, preset, settings):
 
 
 def count(scene, preset, settings):
-    words = [word for text in [*settings, "capture.rays.cube.face=1"] for word in ("--set", text)]
-    words = words if "cube" in preset_text(preset) else words[:-2]
+    words = [word for text in settings for word in ("--set", text)]
     return json.loads(bake(scene, "--preset", preset, *words, "--dry-run", "--json"))["probes"]
-
-
-def preset_text(preset):
-    return (ROOT / "configs" / "presets" / f"{preset}.ron").read_text(encoding="utf-8")
 
 
 def offsets(scene):

@@ -78,7 +78,7 @@ def full_table(report, held):
     rows = report["configurations"]
     least = {key: best(rows, key) for _, key, _ in FIGURES if key.startswith(("error", "air"))}
     head = ["method", "probes", *(name for name, _, _ in FIGURES)]
-    own = typical(rows[0], "bytes")
+    own = next((typical(row, "bytes") for row in rows if row["label"] == "default"), None)
     lines = []
     for row in rows:
         cells = [f"`{row['label']}`", f"{row['probes']:,}"]
@@ -89,7 +89,7 @@ def full_table(report, held):
         if held == "bytes":
             cells.append(significant(typical(row, "bytes") / own))
         lines.append(cells)
-    return markdown([*head, "÷ `physical`'s"] if held == "bytes" else head, lines)
+    return markdown([*head, "÷ `default`'s"] if held == "bytes" else head, lines)
 
 
 def full_tables(part, scenes):
@@ -117,7 +117,8 @@ def short_table(scenes):
             parts = []
             for report in pair:
                 all_rows = report["configurations"] if report else []
-                row = next((row for row in all_rows if row["label"].split(",")[0] == preset), None)
+                own = [row for row in all_rows if row["label"].split(",")[0] == preset]
+                row = min(own, key=lambda row: typical(row, "error_relative"), default=None)
                 value = typical(row, "error_relative") if row else None
                 text = "–" if value is None else significant(100 * value, 2)
                 parts.append(f"**{text}**" if value is not None and value == best(all_rows, "error_relative") else text)

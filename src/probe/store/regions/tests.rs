@@ -129,8 +129,10 @@ fn the_air_answers_as_it_sees_up_to_the_surfaces() {
     // Inside of a solid it is none at all.
     let buried: Vec<bool> = table.masks.iter().map(|mask| *mask == 0).collect();
     let air = air_places(n).map(seen).collect();
-    let regions = Regions::new(&grid, &table, &buried, &[air]);
-    assert_eq!(regions.parts(), 2);
+    let without = Regions::new(&grid, &table, &buried, &[air]);
+    let at = Vec3::new(3.5, 0.5, 3.5) / 8.0;
+    assert_eq!(without.look_up(&grid, &grid.cell(at), at, Facing::of(Vec3::Y)).mask, 0x33);
+    assert!(without.parts() < regions.parts());
 }
 
 #[test]

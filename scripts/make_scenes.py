@@ -17,6 +17,7 @@ from scenes import check, classics, courtyard, office, rooms  # noqa: E402 (afte
 SCENES = {
     "two_rooms_sealed": rooms.two_rooms_sealed,
     "two_rooms_open": rooms.two_rooms_open,
+    "two_rooms_ball": rooms.two_rooms_ball,
     "cornell": classics.cornell,
     "furnace": classics.furnace,
     "thin_wall": rooms.thin_wall,

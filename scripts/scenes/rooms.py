@@ -1,6 +1,6 @@
 """Rooms of solid walls for leaks: two rooms, sealed and open, and walls of 1 mm and of a single sheet."""
 
-from .geometry import box, quad
+from .geometry import box, quad, sphere
 from .glb import Scene
 from .portable import Y, turn
 
@@ -11,6 +11,7 @@ BLUE = (0.2, 0.35, 0.7)
 OCHRE = (0.65, 0.5, 0.25)
 PANEL_DROP = 0.02  # m below the ceiling
 FOOT = 0.01  # m that furniture stands in the floor
+BALL_CENTER, BALL_RADIUS = (-2.0, 0.45, 0.0), 0.25  # m
 
 
 def shell(scene, low, high, wall, paint):
@@ -98,6 +99,20 @@ def two_rooms_open():
         "The two rooms with a passage at one end of the dividing wall: true light and leaked light in one picture.",
         divider_end=0.8,
     )
+
+
+def two_rooms_ball():
+    scene = _two_rooms(
+        "two_rooms_ball",
+        "two_rooms_open and a ball in the air of the lit room: to be rendered with probes that do not know the ball.",
+        divider_end=0.8,
+    )
+    # Fine facets: the reference shades by the normals of the sphere, but its rays leave from the facets.
+    ball = scene.mesh("ball", (sphere(BALL_RADIUS, 48, 24), scene.material("ball", WHITE)))
+    scene.node("ball", ball, BALL_CENTER)
+    # At the ball's height, so that half of what it shows faces the floor.
+    scene.camera("ball", (-2.9, 0.45, 1.5), BALL_CENTER, 19)
+    return scene
 
 
 def thin_wall():

@@ -42,6 +42,7 @@ fn a_fit_brings_look_ups_nearer_to_the_truth_for_any_number_of_threads() {
         assert!(fitted.bytes == two.bytes, "threads change the file");
         let fit = &fitted.report["fit"];
         assert!(number(&fit["held_out_after"]) < 0.6 * number(&fit["held_out_before"]), "{fit}");
+        assert!(number(&fit["held_out_bent_after"]) < 0.6 * number(&fit["held_out_bent_before"]), "{fit}");
         assert!(number(&fit["air_after"]) < number(&fit["air_before"]), "{fit}");
         assert!(number(&fit["rows"]) > 10.0 * number(&fitted.report["probes_active"]), "{fit}");
         assert_eq!(fit["paths"], 8);
@@ -49,6 +50,7 @@ fn a_fit_brings_look_ups_nearer_to_the_truth_for_any_number_of_threads() {
         // In the report, and in the file without what differs from run to run.
         let recorded: Value = serde_json::from_str(&fitted.file.metadata["fit"]).unwrap();
         assert_eq!(recorded["held_out_after"], fit["held_out_after"]);
+        assert_eq!(recorded["held_out_bent_after"], fit["held_out_bent_after"]);
         assert!(recorded["time_s"].is_null());
         // At points and by paths that the fit has not seen.
         let after = error(&fitted.path, name);

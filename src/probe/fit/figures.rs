@@ -26,6 +26,9 @@ pub struct FitFigures {
     /// RMSE at the held-out points of surfaces, with their own normals, those without a row included.
     pub held_out_before: Option<f64>,
     pub held_out_after: Option<f64>,
+    /// The same with bent normals, as normal maps have them; `None` where no row has one.
+    pub held_out_bent_before: Option<f64>,
+    pub held_out_bent_after: Option<f64>,
     /// RMSE at the held-out points of the air, with exact visibility.
     pub air_before: Option<f64>,
     pub air_after: Option<f64>,
@@ -48,6 +51,8 @@ impl FitFigures {
             "iterations": self.iterations,
             "held_out_before": self.held_out_before,
             "held_out_after": self.held_out_after,
+            "held_out_bent_before": self.held_out_bent_before,
+            "held_out_bent_after": self.held_out_bent_after,
             "air_before": self.air_before,
             "air_after": self.air_after,
             "negative_share": self.negative_share,
@@ -67,6 +72,7 @@ impl FitFigures {
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Residuals {
     pub surface: Option<f64>,
+    pub bent: Option<f64>,
     pub air: Option<f64>,
     pub negative: f64,
 }
@@ -94,5 +100,6 @@ pub fn residuals(look_up: &impl Answers, asked: &[Asked], targets: &[Target]) ->
         (found.cmple(Vec3::ZERO) & target.mean().cmpgt(Vec3::ZERO)).any()
     };
     let negative = surface().filter(is_black).count() as f64 / (surface().count() as f64).max(1.0);
-    Residuals { surface: of_kind(Kind::Surface), air: of_kind(Kind::Air), negative }
+    let [surface, bent, air] = [Kind::Surface, Kind::Bent, Kind::Air].map(of_kind);
+    Residuals { surface, bent, air, negative }
 }

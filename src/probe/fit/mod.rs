@@ -107,6 +107,8 @@ pub fn run_on(
         iterations,
         held_out_before: before.surface,
         held_out_after: after.surface,
+        held_out_bent_before: before.bent,
+        held_out_bent_after: after.bent,
         air_before: before.air,
         air_after: after.air,
         negative_share: after.negative,

@@ -328,7 +328,7 @@ fn a_furnace_is_fitted_to_its_closed_form() {
         let rows = RowSettings { rows_per_probe: 100, lambda: 1e-6, air: 0.3, paths: 32, ..RowSettings::default() };
         let figures = run(&Fit::Rows(rows), &world, &untested(), &mut volume, 1, |_| ()).unwrap();
         assert_eq!(figures.non_finite, 0);
-        assert!(figures.held_out_before.unwrap() > 0.99, "{figures:?}");
+        assert!(figures.held_out_before.unwrap() > 0.99 && figures.held_out_bent_before.unwrap() > 0.99, "{figures:?}");
         // Paths end by chance: one has a deviation of about a half of the mean, 100 rows of 32 paths a probe 1 %.
         assert!(figures.held_out_after.unwrap() < 0.04 && figures.air_after.unwrap() < 0.06, "{figures:?}");
         let query = Query { volume: &volume, settings: &untested() };
@@ -338,6 +338,33 @@ fn a_furnace_is_fitted_to_its_closed_form() {
         // Directions that hardly anything asks outer probes for stay dark.
         assert!((mean - 1.0).abs() < 0.03, "{store:?}: {mean}");
     }
+}
+
+/// Probes without light err by the targets themselves: the root of the mean product of both runs, ÷ their mean.
+#[test]
+fn held_out_points_of_each_kind_have_figures_of_their_own() {
+    let volume = volume(&octahedral(4));
+    let query = Query { volume: &volume, settings: &untested() };
+    let figures = |points: &[(Kind, bool, [f32; 2])]| {
+        let mut random = random(0);
+        let ask = |&(kind, is_held_out, _): &(Kind, bool, [f32; 2])| Asked {
+            kind,
+            is_held_out,
+            ..asked_in_air(inside(&volume, &mut random).position, Vec3::Y)
+        };
+        let asked: Vec<Asked> = points.iter().map(ask).collect();
+        let targets: Vec<_> = points.iter().map(|(.., runs)| targets::Target { runs: runs.map(Vec3::splat) }).collect();
+        figures::residuals(&query, &asked, &targets)
+    };
+    let surface = [(Kind::Surface, true, [1.0, 1.0]), (Kind::Surface, true, [3.0, 3.0])];
+    let bent = [(Kind::Bent, true, [2.0, 2.0]), (Kind::Bent, true, [4.0, 6.0]), (Kind::Bent, false, [90.0, 90.0])];
+    let air = [(Kind::Air, true, [1.0, 4.0])];
+    let found = figures(&[&surface[..], &bent, &air].concat());
+    let is_near = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-12;
+    assert!(is_near(found.surface, 5f64.sqrt() / 2.0), "{found:?}");
+    assert!(is_near(found.bent, 14f64.sqrt() / 3.5), "{found:?}");
+    assert!(is_near(found.air, 2.0 / 2.5), "{found:?}");
+    assert_eq!(figures(&surface).bent, None);
 }
 
 #[test]

@@ -53,7 +53,10 @@ pub fn table(report: &RenderReport) -> String {
     text.extend(report.methods.iter().map(|method| format!("\n{}", air_line(method))));
     let baked = report.baked.as_ref().filter(|b| b.figures.bias.is_some()).map(baked_line);
     if report.fitted {
-        text.push_str("\nfitted probes: the row without visibility says nothing of the method");
+        text.push_str(match report.export {
+            None => "\nfitted probes: the row without visibility says nothing of the method",
+            Some(_) => "\nfitted to the engine's look-up: exact visibility, and leaks against it, say nothing of it",
+        });
     }
     let reason = report.baked_reason.map(|reason| format!("no figure of the bake itself: {reason}"));
     for line in error_lines(report, mean).into_iter().chain(baked).chain(reason) {

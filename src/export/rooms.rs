@@ -25,6 +25,12 @@ use crate::trace::Ray;
 /// Probes of the smallest room. Fewer stand in pockets: within furniture, under a roof.
 const SMALLEST: usize = 4;
 
+/// Spacings. What is thinner is the inside of a wall.
+const THINNEST: f32 = 0.5;
+
+/// Spacings that rays may find a room shorter than it is.
+const ROUNDING: f32 = 0.01;
+
 /// By which a block reaches into the walls around it, spacings: surfaces lie in it, whatever rounding makes of them.
 const INTO_WALLS: f32 = 0.01;
 
@@ -43,24 +49,19 @@ pub struct Blocks {
     pub warnings: Vec<String>,
 }
 
-/// A block for each room, large ones first, and where probes stand outside of all rooms one of the whole lattice before
-/// them, as far as the engine's rules take the last.
+/// A block for each room, large ones first. Where probes stand outside of all rooms one of the whole lattice comes before them,
+/// as far as the engine's rules take the last.
 pub fn blocks(world: &World, volume: &Volume, query: &QuerySettings, rules: Rules) -> Blocks {
-    let (mut rooms, strays) = rooms(world, volume);
-    let mut warnings = Vec::new();
-    if !rules.takes_last() {
-        let all = rooms.len();
-        rooms = without_shells(&rooms);
-        if rooms.len() < all {
-            let number = all - rooms.len();
-            warnings
-                .push(format!("left out {number} volumes around others, whose light the engine would mix with theirs"));
-        }
-    }
+    let rooms = without_shells(&rooms(world, volume));
     if rooms.len() < 2 {
         let (grids, notes) = one_block(volume, query, rules);
         let warnings = vec!["--volumes auto found no two rooms that are closed to each other: one volume".to_owned()];
         return Blocks { grids, notes, warnings };
+    }
+    let mut warnings = overlaps(&rooms, &volume.grid);
+    let strays = strays(volume, &rooms);
+    if strays > 0 && !rules.takes_last() {
+        warnings.push(format!("{strays} probes stand outside of all rooms: surfaces there get no light"));
     }
     let (mut own, mut notes, mut blocks) = (Vec::new(), Vec::new(), Vec::new());
     if strays > 0 && rules.takes_last() {
@@ -74,7 +75,8 @@ pub fn blocks(world: &World, volume: &Volume, query: &QuerySettings, rules: Rule
     let contacts = Contacts::of_points(world.scene, &volume.positions);
     for room in &rooms {
         let size = room.high - room.low;
-        let divisions = (size / volume.grid.spacing()).round().max(Vec3::ONE).as_uvec3();
+        // As many as planes of the lattice fit into the room.
+        let divisions = (size / volume.grid.spacing() + ROUNDING).floor().as_uvec3() + UVec3::ONE;
         let margin = size / divisions.as_vec3() * INTO_WALLS;
         let start = blocks.iter().map(Block::count).sum::<usize>() as u32;
         let block = Block::filling(room.low - margin, room.high + margin, divisions, start);
@@ -88,7 +90,6 @@ pub fn blocks(world: &World, volume: &Volume, query: &QuerySettings, rules: Rule
         notes.push(Notes { holes, moved: Vec::new() });
         blocks.push(block);
     }
-    warnings.extend(overlaps(&rooms, &volume.grid));
     let mut grids = Grids::new(rules, volume.grid.uniform(), blocks);
     grids.values = own.concat();
     Blocks { grids, notes, warnings }
@@ -117,26 +118,61 @@ fn seen(world: &World, look_up: &Query, contacts: &Contacts, position: Vec3) -> 
     })
 }
 
-/// The rooms of a volume, from large to small, and how many active probes stand in none.
-pub fn rooms(world: &World, volume: &Volume) -> (Vec<Room>, usize) {
-    let (members, strays) = members(world, volume);
+/// The rooms of a volume, from large to small.
+pub fn rooms(world: &World, volume: &Volume) -> Vec<Room> {
     let contacts = Contacts::of_points(world.scene, &volume.positions);
+    let spacing = volume.grid.spacing();
     let room = |own: &Vec<usize>| {
         let viewpoint = |probe: usize| contacts.viewpoint(probe, volume.positions[probe]);
-        let reaches = own.par_iter().map(|&probe| reach(world, volume, viewpoint(probe), probe));
-        let whole = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
-        let (low, high) = reaches.reduce(|| (Vec3::INFINITY, Vec3::NEG_INFINITY), whole);
+        let reaches: Vec<[[End; 3]; 2]> =
+            own.par_iter().map(|&probe| reach(world, volume, viewpoint(probe), probe)).collect();
+        let along = |side: usize, sign: f32| {
+            let face = |axis: usize| {
+                let ends = reaches.iter().map(|reach| reach[side][axis]);
+                sign * face(ends.map(|end| End { at: sign * end.at, ..end }).collect(), spacing[axis])
+            };
+            Vec3::from([0, 1, 2].map(face))
+        };
+        let (low, high) = (along(0, -1.0), along(1, 1.0));
         Room { low, high, probes: own.len() }
     };
-    let mut rooms: Vec<Room> = members.iter().map(room).collect();
+    let mut rooms: Vec<Room> = members(world, volume).iter().map(room).collect();
+    rooms.retain(|room| ((room.high - room.low) / spacing).min_element() > THINNEST);
     let volume_of = |room: &Room| (room.high - room.low).element_product();
     rooms.sort_by(|a, b| volume_of(b).total_cmp(&volume_of(a)));
-    (rooms, strays)
+    rooms
+}
+
+/// How far air reaches in one direction.
+#[derive(Debug, Clone, Copy)]
+struct End {
+    /// Along its axis, relative to the scene's origin, metres.
+    at: f32,
+    /// Whether a surface ends it, and not merely the probe's cell.
+    is_wall: bool,
+}
+
+/// Where a room ends: the middle of the walls within a spacing of the farthest end, so that it ends at the wall around a door
+/// and not behind it, and at the ceiling and not at a lamp.
+fn face(ends: Vec<End>, spacing: f32) -> f32 {
+    let farthest = ends.iter().map(|end| end.at).fold(f32::NEG_INFINITY, f32::max);
+    let is_near = |end: &End| end.is_wall && end.at > farthest - spacing;
+    let mut walls: Vec<f32> = ends.into_iter().filter(is_near).map(|end| end.at).collect();
+    walls.sort_by(f32::total_cmp);
+    walls.get(walls.len() / 2).copied().unwrap_or(farthest)
+}
+
+/// How many active probes stand in no room's box.
+fn strays(volume: &Volume, rooms: &[Room]) -> usize {
+    let margin = INTO_WALLS * volume.grid.spacing();
+    let holds = |room: &Room, p: Vec3| p.cmpge(room.low - margin).all() && p.cmple(room.high + margin).all();
+    let is_stray = |probe: &usize| !rooms.iter().any(|room| holds(room, volume.positions[*probe]));
+    volume.active().filter(is_stray).count()
 }
 
 /// A warning where cells have probes of two rooms: plain filtering mixes their light there.
 pub fn shared(world: &World, volume: &Volume) -> Option<String> {
-    let (members, _) = members(world, volume);
+    let members = members(world, volume);
     let mut room = vec![usize::MAX; volume.states.len()];
     for (number, own) in members.iter().enumerate() {
         own.iter().for_each(|&probe| room[probe] = number);
@@ -159,8 +195,8 @@ pub fn shared(world: &World, volume: &Volume) -> Option<String> {
     ))
 }
 
-/// The probes of each room in the order of their lowest, and how many active probes stand in none.
-fn members(world: &World, volume: &Volume) -> (Vec<Vec<usize>>, usize) {
+/// The probes of each room, in the order of their lowest.
+fn members(world: &World, volume: &Volume) -> Vec<Vec<usize>> {
     let grid = &volume.grid;
     let contacts = Contacts::of_points(world.scene, &volume.positions);
     let viewpoint = |probe: usize| contacts.viewpoint(probe, volume.positions[probe]);
@@ -196,23 +232,20 @@ fn members(world: &World, volume: &Volume) -> (Vec<Vec<usize>>, usize) {
         let root = root(&mut parent, probe);
         members[root].push(probe);
     }
-    let strays = members.iter().filter(|own| own.len() < SMALLEST).map(Vec::len).sum();
     members.retain(|own| own.len() >= SMALLEST);
-    (members, strays)
+    members
 }
 
-/// How far the air reaches from a probe along the axes, to the next surface or to its cell's end.
-fn reach(world: &World, volume: &Volume, from: Vec3, probe: usize) -> (Vec3, Vec3) {
+/// How far the air reaches from a probe against the axes and along them, to the next surface or to its cell's end.
+fn reach(world: &World, volume: &Volume, from: Vec3, probe: usize) -> [[End; 3]; 2] {
     let spacing = volume.grid.spacing() * volume.grid.width(ProbeIndex(probe as u32)) as f32;
-    let (mut low, mut high) = (from, from);
-    for axis in 0..3 {
-        for (end, sign) in [(&mut low, -1.0), (&mut high, 1.0)] {
-            let direction = sign * Vec3::AXES[axis];
-            let met = world.tracer.closest(Ray::new(from, direction, axis as u32)).map_or(f32::INFINITY, |hit| hit.t);
-            end[axis] += sign * met.min(spacing[axis]);
-        }
-    }
-    (low, high)
+    [-1.0, 1.0].map(|sign| {
+        [0, 1, 2].map(|axis| {
+            let ray = Ray::new(from, sign * Vec3::AXES[axis], axis as u32);
+            let met = world.tracer.closest(ray).map_or(f32::INFINITY, |hit| hit.t);
+            End { at: from[axis] + sign * met.min(spacing[axis]), is_wall: met <= spacing[axis] }
+        })
+    })
 }
 
 fn root(parent: &mut [usize], mut probe: usize) -> usize {

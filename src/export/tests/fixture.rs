@@ -37,7 +37,7 @@ pub fn grids(rules: Rules, divisions: UVec3, count: u32) -> Grids {
     let blocks = (0..count).map(block).collect();
     let mut grids = Grids::new(rules, grid, blocks);
     let mut random = Random::new(3, Purpose::FitPoints, 7, 0);
-    let mean = |i: usize| rules == Rules::Bevy || i % COUNT == 0;
+    let mean = |i: usize| rules == Rules::Bevy || i.is_multiple_of(COUNT);
     for i in 0..grids.values.len() {
         let value = Vec3A::new(random.uniform(), random.uniform(), random.uniform());
         // The mean is so large that no sum is negative.

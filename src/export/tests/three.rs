@@ -14,9 +14,9 @@ fn coefficients_of_three_lie_where_its_shader_unpacks_them() {
     let mut own = grids(Rules::Three, divisions, 1);
     // Radiance coefficient j, channel k of probe p: 100·p + 3·j + k.
     for p in 0..4 {
-        for j in 0..COUNT {
+        for (j, cosine) in COSINE.iter().enumerate() {
             let c = Vec3A::new(0.0, 1.0, 2.0) + (100 * p + 3 * j) as f32;
-            own.values[p * COUNT + j] = c * (Y0 * COSINE[j]);
+            own.values[p * COUNT + j] = c * (Y0 * cosine);
         }
     }
     let numbers = three::pack(&own, &own.blocks[0]);

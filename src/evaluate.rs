@@ -1,6 +1,7 @@
 //! A volume of probes judged by a picture: the light that it gives with each way of treating visibility, what leaks, what it costs,
 //! and how far it is from a reference. `render` does it once for every camera, `sweep` for every configuration.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::Vec3;
@@ -114,6 +115,16 @@ impl Scenery<'_, '_> {
             step();
             Shaded { mode, image: compose(self.view, &irradiance), irradiance, in_air, report }
         })
+    }
+
+    /// One look-up by its own rules, at these points of the air.
+    pub fn shade_as(&self, look_up: &impl Answers, name: &'static str, air: &Air, bytes_per_probe: f64) -> Shaded {
+        let (masks, masks_s) = self.masks(look_up);
+        let air = Air::of(self.world, look_up, Arc::clone(&air.points));
+        let seen = Seen { masks: &masks, masks_s, air: &air };
+        let [_, mut own, _] = self.shade(look_up, seen, bytes_per_probe, || {});
+        own.report.name = name;
+        own
     }
 
     /// The same probes with other light in them; times and bytes are those of `like`.

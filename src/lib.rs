@@ -10,7 +10,7 @@
 //! | 2 rays | [`trace`] | Embree behind one small type; the only unsafe code |
 //! | 3 light | [`light`] | what a surface sends out: one definition for bake, render and reference |
 //! | 4 probes | [`probe`] | lattice, placement, capture, transport, store, query, file |
-//! | 5 bake | [`config`], [`plan`], [`bake`] | what was asked, what is left out, and doing it |
+//! | 5 bake | [`config`], [`plan`], [`bake`], [`export`] | what was asked, what is left out, and doing it; probes for engines |
 //! | 6 results | [`shade`], [`report`], [`evaluate`] | pictures and figures |
 //! | 7 edge | [`sweep`], [`cli`], [`commands`] | series of bakes, and the command line |
 #![deny(unsafe_code)]
@@ -30,6 +30,7 @@ pub mod probe;
 
 pub mod bake;
 pub mod config;
+pub mod export;
 pub mod plan;
 
 pub mod evaluate;

@@ -1,5 +1,7 @@
 //! The command line: what was typed. `commands/` turns it into what it means.
 
+mod export;
+mod trace;
 mod values;
 
 use std::path::PathBuf;
@@ -8,10 +10,11 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand};
 
 use crate::probe::lattice::grid::MAX_PROBES;
-use crate::scene::EnvironmentSource;
 
+pub use self::export::{EngineName, ExportArgs, TargetName, VolumesName};
+pub use self::trace::TraceArgs;
 pub use self::values::{LookAt, PictureSize};
-use self::values::{parse_exposure, parse_finite, parse_not_negative, parse_positive, parse_size, parse_target_error};
+use self::values::{parse_exposure, parse_positive, parse_size, parse_target_error};
 
 /// Bakes light-field probe volumes for global illumination and measures how much they leak, err and cost.
 #[derive(Debug, Parser)]
@@ -70,31 +73,20 @@ pub enum Command {
     /// Irradiance is copied to every cell that a probe stands for; distances are copied where it stands for one, and traced
     /// again elsewhere.
     Convert(ConvertArgs),
+    /// Write probes as an engine takes them.
+    ///
+    /// Axes are glTF's: right-handed, +Y up, metres, linear Rec. 709. Probes hold all light that bounced, and that of emissive
+    /// surfaces and of the sky: the engine adds punctual lights with shadows, and no ambient light or environment.
+    ///
+    /// three: spherical harmonics of radiance for LightProbeGrid of three.js 0.187, with a loader and a page; materials
+    /// divide by π. bevy: irradiance ÷ π for IrradianceVolume of Bevy 0.20 (KTX2); its shader does not divide. ddgi: the
+    /// textures of RTXGI (DDS; EXR to look at): irradiance ÷ 2π, to the power 1/5. exr: all maps in one picture, W·m⁻².
+    ///
+    /// three and Bevy blend probes by distance alone, so that light comes through walls between probes. --fit chooses the values
+    /// by which that is right as far as can be, --volumes auto keeps rooms apart; `render --as` says how right.
+    Export(ExportArgs),
     /// Print what a probe file holds, and check its hashes.
     Inspect(InspectArgs),
-}
-
-/// Flags of every command that loads a scene and traces it.
-#[derive(Debug, Args)]
-pub struct TraceArgs {
-    /// Sky: an equirectangular map, its centre −Z and its top +Y, or a constant radiance, W·m⁻²·sr⁻¹.
-    ///
-    /// FILE.exr:LAYER reads a layer or part of an OpenEXR file instead of its plain R, G, B. `EXPOSURE` and `COLORCORR` of
-    /// HDR files are divided out; primaries other than Rec. 709 are converted, white to white (Bradford).
-    #[arg(long, value_name = "FILE.hdr|FILE.exr[:LAYER]|R,G,B", value_parser = EnvironmentSource::from_str, allow_hyphen_values = true)]
-    pub env: Option<EnvironmentSource>,
-    /// Turn the map of --env about +Y, counterclockwise as seen from above: 90 takes its centre from −Z to −X.
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = parse_finite, allow_hyphen_values = true)]
-    pub env_rotate: f64,
-    /// Multiply the radiance of --env, from 0 up; a sky of the configuration is used as it is.
-    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = parse_not_negative, allow_hyphen_values = true)]
-    pub env_scale: f32,
-    /// Seed of all random numbers.
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
-    pub seed: u64,
-    /// Threads to use; 0 means one per core. The result does not depend on it.
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
-    pub threads: usize,
 }
 
 /// Flags that choose a configuration.
@@ -145,7 +137,7 @@ pub struct BakeArgs {
     #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = parse_target_error)]
     pub target_error: Option<f64>,
     /// Most probes of a grid that --target-error may choose, times its samples ÷ those of the configuration.
-    #[arg(long, value_name = "N", default_value_t = 32_768, allow_negative_numbers = true, requires = "target_error", value_parser = clap::value_parser!(u64).range(1..=MAX_PROBES))]
+    #[arg(long, value_name = "N", default_value_t = 65_536, allow_negative_numbers = true, requires = "target_error", value_parser = clap::value_parser!(u64).range(1..=MAX_PROBES))]
     pub max_probes: u64,
     /// Also write the report to this file.
     #[arg(long, value_name = "FILE.json")]
@@ -175,9 +167,12 @@ pub struct RenderArgs {
     pub scene: PathBuf,
     #[command(flatten)]
     pub trace: TraceArgs,
-    /// Probe file that `bake` wrote.
-    #[arg(value_name = "PROBES")]
+    /// Probe file that `bake` wrote, or a folder that `export` wrote: then all rows are of the engine's look-up.
+    #[arg(value_name = "PROBES|DIR")]
     pub probes: PathBuf,
+    /// Also shade as an engine would after `export`, without --fit, and report leak, error and bytes of that.
+    #[arg(long = "as", value_enum, value_name = "ENGINE")]
+    pub engine: Option<EngineName>,
     /// Folder for pictures and report; created where missing.
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,

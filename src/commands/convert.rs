@@ -26,7 +26,7 @@ pub fn run(args: &ConvertArgs, console: &Console) -> Result<()> {
         scene: &args.scene,
         trace: &args.trace,
         light: probes.query.light,
-        probes: Some(Probes { path: &args.probes, file: &probes, allow_change: args.allow_scene_change }),
+        probes: Some(Probes::of(&args.probes, &probes, args.allow_scene_change)),
         detail: Detail::LIGHT,
         keep_images: false,
         inputs: vec![Named::new("the probe file", &args.probes)],

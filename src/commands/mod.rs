@@ -4,6 +4,7 @@ pub mod bake;
 mod camera;
 pub mod convert;
 pub mod diff_report;
+pub mod export;
 pub mod inspect;
 pub mod reference;
 pub mod render;
@@ -89,6 +90,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Sweep(args) => sweep::run(&args, &console)?,
         Command::DiffReport(args) => return diff_report::run(&args, &console),
         Command::Convert(args) => convert::run(&args, &console)?,
+        Command::Export(args) => export::run(&args, &console)?,
         Command::Inspect(args) => inspect::run(&args, &console)?,
     }
     Ok(Outcome::Done)

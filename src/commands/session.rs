@@ -35,13 +35,22 @@ pub struct Opening<'a> {
     pub outputs: Vec<Named>,
 }
 
-/// A probe file that a command reads beside the scene.
+/// Probes that a command reads beside the scene.
 #[derive(Clone, Copy)]
 pub struct Probes<'a> {
     pub path: &'a Path,
-    pub file: &'a ProbeFile,
+    /// The scene of their bake.
+    pub scene: &'a SceneRecord,
+    /// The environment map of their bake, in words.
+    pub environment: Option<&'a str>,
     /// Whether the scene may be another than that of the bake.
     pub allow_change: bool,
+}
+
+impl<'a> Probes<'a> {
+    pub fn of(path: &'a Path, file: &'a ProbeFile, allow_change: bool) -> Probes<'a> {
+        Probes { path, scene: &file.scene, environment: plan::environment_map(&file.plan), allow_change }
+    }
 }
 
 /// A loaded scene and the circumstances of the command that works on it.
@@ -81,7 +90,8 @@ impl<'c> Session<'c> {
         };
         let scene = scene::load(path, &options)?;
         // Before warnings: what the scene lacks may be the sky of the bake.
-        let lost_sky = opening.probes.and_then(|probes| lost_sky(trace, probes.file));
+        let is_dark = trace.env.is_none() && light.sky.is_none();
+        let lost_sky = opening.probes.and_then(|probes| probes.environment).filter(|_| is_dark);
         let scene_changed = match opening.probes {
             Some(probes) => check_scene(probes, path, &scene, lost_sky, console)?,
             None => false,
@@ -147,7 +157,7 @@ impl<'c> Session<'c> {
 }
 
 /// Binds the work to this many threads; 0 means one per core.
-fn set_threads(threads: usize) -> Result<usize> {
+pub fn set_threads(threads: usize) -> Result<usize> {
     /// More than any machine has; guards against typing errors that would exhaust memory.
     const MOST: usize = 1024;
     ensure!(threads <= MOST, "--threads {threads}: at most {MOST} make sense; use 0 for one per core");
@@ -215,11 +225,6 @@ fn check_sky_flags(trace: &TraceArgs, sky: Option<(f32, f32, f32)>) -> Result<()
     }
 }
 
-/// The environment map that the probes were baked under, in words, where no sky is given now.
-fn lost_sky<'p>(trace: &TraceArgs, probes: &'p ProbeFile) -> Option<&'p str> {
-    plan::environment_map(&probes.plan).filter(|_| trace.env.is_none() && probes.query.light.sky.is_none())
-}
-
 /// Whether the scene is another than the probes were baked from; an error unless allowed.
 fn check_scene(
     probes: Probes,
@@ -228,8 +233,8 @@ fn check_scene(
     lost_sky: Option<&str>,
     console: &Console,
 ) -> Result<bool> {
-    let Probes { path, file, allow_change } = probes;
-    if file.scene.blake3 == scene.blake3 {
+    let Probes { path, scene: baked, allow_change, .. } = probes;
+    if baked.blake3 == scene.blake3 {
         return Ok(false);
     }
     let (path, scene_path) = (path.display(), scene_path.display());

@@ -63,6 +63,20 @@ impl Picture {
     }
 }
 
+/// A file of these plain channels, sorted by name as EXR demands, each `width · height` numbers, row 0 at the top.
+///
+/// # Errors
+/// No pixels or channels, and what the encoder says.
+pub fn exr_bytes(width: u32, height: u32, channels: &[(&str, Vec<f32>)]) -> io::Result<Vec<u8>> {
+    if width == 0 || height == 0 || channels.is_empty() {
+        return Err(io::Error::other("there is nothing in it"));
+    }
+    let channels = channels.iter().map(|(name, samples)| channel(name, FlatSamples::F32(samples.clone()))).collect();
+    let mut file = io::Cursor::new(Vec::new());
+    image(width, height, channels, LayerAttributes::default()).write().to_buffered(&mut file).map_err(io_error)?;
+    Ok(file.into_inner())
+}
+
 /// Whether a layer may have this name. Layer names become parts of channel names, in which a dot is the separator.
 fn is_identifier(name: &str) -> bool {
     (1..=MAX_NAME_BYTES).contains(&name.len()) && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
@@ -99,13 +113,24 @@ fn write_channels(
         let json = serde_json::to_vec(texts).unwrap_or_default();
         attributes.other.insert(Text::from(TEXTS), AttributeValue::Text(Text::from_slice_unchecked(&json)));
     }
+    let image = image(width, height, channels, attributes);
+    Ok(write_atomically(path, |file| image.write().to_buffered(file).map_err(io_error))?)
+}
+
+/// One part of these channels.
+fn image(
+    width: u32,
+    height: u32,
+    channels: Vec<AnyChannel<FlatSamples>>,
+    attributes: LayerAttributes,
+) -> Image<Layer<AnyChannels<FlatSamples>>> {
     let encoding =
         Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
     let size = Vec2(width as usize, height as usize);
     let layer = Layer::new(size, attributes, encoding, AnyChannels::sort(SmallVec::from_vec(channels)));
     let mut image = Image::from_layer(layer);
     image.attributes.chromaticities = Some(REC_709);
-    Ok(write_atomically(path, |file| image.write().to_buffered(file).map_err(io_error))?)
+    image
 }
 
 fn io_error(error: exr::error::Error) -> io::Error {

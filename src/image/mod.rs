@@ -17,6 +17,7 @@ mod tonemap;
 
 pub use any::{AnyImage, ImageHeader};
 pub use error::ImageError;
+pub use exr_write::exr_bytes;
 pub use layered::LayeredImage;
 pub use picture::{Picture, Picture8};
 pub use tonemap::{auto_exposure, tonemap};

@@ -44,6 +44,9 @@ pub struct RenderReport {
     /// Why `baked` is `null` although it was asked for; absent where it was not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub baked_reason: Option<&'static str>,
+    /// The engine whose export was shaded in place of a probe file: all methods look up as it does. Absent for probe files.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub export: Option<&'static str>,
     pub methods: Vec<MethodReport>,
 }
 

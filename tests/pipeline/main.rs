@@ -12,6 +12,7 @@ mod damage;
 mod decoding;
 mod determinism;
 mod distances;
+mod exporting;
 mod fitting;
 mod furnace;
 mod layers;

@@ -6,6 +6,7 @@ use anyhow::Result;
 
 use crate::cli::{PictureSize, RenderArgs};
 use crate::commands::{Console, check_picture_memory};
+use crate::export::Target;
 use crate::light::World;
 use crate::scene::Camera;
 use crate::shade::outlook::Outlook;
@@ -48,7 +49,12 @@ const REFERENCE: &str = "reference.exr";
 pub fn pictures(args: &RenderArgs, folder: &Path) -> Vec<Named> {
     let compared = args.reference.is_some() || args.reference_image.is_some();
     let comparisons = COMPARISONS.iter().chain([&REFERENCE]).filter(|_| compared);
-    PICTURES.iter().chain(comparisons).map(|name| Named::new("-o", folder.join(name))).collect()
+    let of_engine = args.engine.iter().flat_map(|engine| {
+        let name = Target::from(*engine).method();
+        ["exr", "png"].map(|extension| Named::new("-o", folder.join(format!("{name}.{extension}"))))
+    });
+    let own = PICTURES.iter().chain(comparisons).map(|name| Named::new("-o", folder.join(name)));
+    own.chain(of_engine).collect()
 }
 
 /// Refuses a folder in which not all pictures can be written, before any is made.

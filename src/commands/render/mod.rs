@@ -8,20 +8,22 @@ mod table;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 
 use self::check::{check_pictures, check_view, pictures};
 use self::reference::{Reference, Shot, Source};
 use super::camera::cameras;
+use super::export::{self, unfitted};
 use super::session::{Opening, Probes, Session, inputs};
 use super::{Console, tell, write_json};
-use crate::cli::RenderArgs;
+use crate::cli::{EngineName, RenderArgs};
 use crate::config::Config;
 use crate::evaluate::{BakedTruth, Comparison, PATH_RAY, Scenery, Seen, Shaded};
+use crate::export::{Export, ExportError, Target, Written};
 use crate::light::World;
 use crate::probe::Volume;
-use crate::probe::file::{self, ProbeFile};
-use crate::probe::query::Query;
+use crate::probe::file::{self, LightRecord, ProbeFile};
+use crate::probe::query::{Answers, Query, QuerySettings};
 use crate::report::baked;
 use crate::report::render::{RenderReport, RenderTimes, SCHEMA};
 use crate::scene::{Camera, Detail};
@@ -31,56 +33,168 @@ use crate::system::memory::peak_memory_bytes;
 use crate::system::output::{Named, create_folder};
 
 /// What all cameras of a run share.
-struct Run<'a> {
+struct Run<'a, A> {
     args: &'a RenderArgs,
     session: &'a Session<'a>,
     world: &'a World<'a>,
-    probes: &'a ProbeFile,
-    volume: Volume,
+    probes: Shown<'a, A>,
     reference: Option<Source>,
     truth: Option<BakedTruth>,
     accel_build_s: f64,
 }
 
+/// What is shaded: a probe file, or an export.
+struct Shown<'a, A> {
+    look_up: A,
+    /// For pictures of the probes.
+    volume: &'a Volume,
+    bytes_per_probe: f64,
+    seed: Option<u64>,
+    config: &'a str,
+    is_fitted: bool,
+    /// Of a probe file; `None` for an export, whose probes have no truth of their own.
+    settings: Option<&'a QuerySettings>,
+    /// The engine of an export in place of a probe file.
+    export: Option<Target>,
+    /// The look-up of `--as`, its name and its bytes per probe.
+    also: Option<(Target, Written, f64)>,
+}
+
+impl From<EngineName> for Target {
+    fn from(name: EngineName) -> Target {
+        match name {
+            EngineName::Three => Target::Three,
+            EngineName::Bevy => Target::Bevy,
+            EngineName::Ddgi => Target::Ddgi,
+        }
+    }
+}
+
 pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
-    let inputs = inputs(&args.scene, &args.trace, [Named::new("the probe file", &args.probes)]);
-    check_pictures(args, &args.output, &inputs)?;
+    check_pictures(args, &args.output, &read(args))?;
     let reference = Source::of(args)?;
+    if args.probes.is_dir() {
+        return run_export(args, reference, console);
+    }
     let probes = file::read(&args.probes)?;
-    let session = Session::open(opening(args, &probes), console)?;
+    let origin = Probes::of(&args.probes, &probes, args.allow_scene_change);
+    let session = Session::open(opening(args, probes.query.light, origin), console)?;
     let (world, accel_build_s) = session.world()?;
     tell::probes(console, &args.probes, &probes);
+    let cameras = prepare(args, &session, &world)?;
+    let volume = probes.volume_as_planned(session.scene.origin_world);
+    let truth = args.bake_error.then(|| truth(args, &session, &world, &probes, &volume));
+    let settings = &probes.query.weights;
+    let shown = Shown {
+        look_up: Query { volume: &volume, settings },
+        volume: &volume,
+        bytes_per_probe: probes.runtime_bytes(),
+        seed: probes.seed,
+        config: &probes.config,
+        is_fitted: probes.fit.is_some(),
+        settings: Some(settings),
+        export: None,
+        also: args.engine.map(|engine| as_engine(args, engine, &probes, &volume, &world)).transpose()?,
+    };
+    let (session, world) = (&session, &world);
+    finish(&Run { args, session, world, probes: shown, reference, truth, accel_build_s }, &cameras)
+}
 
-    let cameras = cameras(&args.view, &world, console)?;
+/// The look-up of an engine on what `export` would write.
+fn as_engine(
+    args: &RenderArgs,
+    engine: EngineName,
+    probes: &ProbeFile,
+    volume: &Volume,
+    world: &World,
+) -> Result<(Target, Written, f64)> {
+    let (to, place) = (Target::from(engine), args.probes.display());
+    let export = unfitted(to, volume, probes, &export::origin(probes), Some(world))
+        .with_context(|| format!("{place}: as an export to {}", to.name()))?;
+    let written = export.as_read().map_err(|what| anyhow!("{place}: its export cannot be read back: {what}"))?;
+    let bytes = export.bytes() as f64 / export.probes().max(1) as f64;
+    Ok((to, written.relative_to(world.scene.origin_world), bytes))
+}
+
+/// A folder that `export` wrote in place of a probe file.
+fn run_export(args: &RenderArgs, reference: Option<Source>, console: &Console) -> Result<()> {
+    let place = args.probes.display();
+    if args.engine.is_some() || args.bake_error {
+        let flag = if args.bake_error { "--bake-error" } else { "--as" };
+        bail!(
+            "{flag} asks for a probe file, and {place} is an export; leave {flag} out, or give the file that `bake` wrote"
+        );
+    }
+    let export = Export::read(&args.probes)?;
+    let damaged = |what| ExportError::Damaged { path: args.probes.clone(), what };
+    let written = export.as_read().map_err(damaged)?;
+    let record = &export.record;
+    let origin = Probes {
+        path: &args.probes,
+        scene: &record.scene,
+        environment: record.environment.as_deref(),
+        allow_change: args.allow_scene_change,
+    };
+    let session = Session::open(opening(args, record.light, origin), console)?;
+    let (world, accel_build_s) = session.world()?;
+    let cameras = prepare(args, &session, &world)?;
+    let written = written.relative_to(session.scene.origin_world);
+    let volume = written.drawn();
+    let shown = Shown {
+        look_up: &written,
+        volume: &volume,
+        bytes_per_probe: export.bytes() as f64 / export.probes().max(1) as f64,
+        seed: record.seed,
+        config: &record.config,
+        is_fitted: record.fit.is_some(),
+        settings: None,
+        export: Some(record.to),
+        also: None,
+    };
+    let (session, world) = (&session, &world);
+    finish(&Run { args, session, world, probes: shown, reference, truth: None, accel_build_s }, &cameras)
+}
+
+/// What the command reads.
+fn read(args: &RenderArgs) -> Vec<Named> {
+    inputs(&args.scene, &args.trace, [Named::new("the probe file", &args.probes)])
+}
+
+/// The cameras, once all that they need is known to be possible.
+fn prepare(args: &RenderArgs, session: &Session, world: &World) -> Result<Vec<Camera>> {
+    let cameras = cameras(&args.view, world, session.console)?;
     if args.reference_image.is_some() && cameras.len() > 1 {
         bail!("--reference-image is of one camera and --camera all asks for {}; name one", cameras.len());
     }
     for camera in &cameras {
-        check_pictures(args, &folder(args, camera), &inputs)?;
+        check_pictures(args, &folder(args, camera), &read(args))?;
         session.check_apart(&pictures(args, &folder(args, camera)))?;
-        check_view(args, &world, camera, console)?;
+        check_view(args, world, camera, session.console)?;
     }
-    let volume = probes.volume_as_planned(session.scene.origin_world);
-    let truth = if args.bake_error { Some(truth(args, &session, &world, &probes, &volume)) } else { None };
-    let run = Run { args, session: &session, world: &world, probes: &probes, volume, reference, truth, accel_build_s };
+    Ok(cameras)
+}
+
+/// Renders all cameras and prints what was found.
+fn finish<A: Answers>(run: &Run<A>, cameras: &[Camera]) -> Result<()> {
+    let args = run.args;
     let reports: Vec<RenderReport> =
-        cameras.iter().map(|camera| render_camera(&run, camera, &folder(args, camera))).collect::<Result<_>>()?;
+        cameras.iter().map(|camera| render_camera(run, camera, &folder(args, camera))).collect::<Result<_>>()?;
     let text = || {
         let tables: Vec<String> = reports.iter().map(table::table).collect();
         format!("{}\nwrote {}", tables.join("\n"), args.output.display())
     };
     match &reports[..] {
-        [report] => session.print(report, text),
-        _ => session.print(&reports, text),
+        [report] => run.session.print(report, text),
+        _ => run.session.print(&reports, text),
     }
 }
 
-fn opening<'a>(args: &'a RenderArgs, probes: &'a ProbeFile) -> Opening<'a> {
+fn opening<'a>(args: &'a RenderArgs, light: LightRecord, probes: Probes<'a>) -> Opening<'a> {
     Opening {
         scene: &args.scene,
         trace: &args.trace,
-        light: probes.query.light,
-        probes: Some(Probes { path: &args.probes, file: probes, allow_change: args.allow_scene_change }),
+        light,
+        probes: Some(probes),
         detail: Detail::PICTURE,
         keep_images: false,
         inputs: vec![Named::new("the probe file", &args.probes)],
@@ -119,10 +233,9 @@ fn folder_name(camera: &str) -> String {
     camera.chars().map(safe).collect()
 }
 
-fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderReport> {
-    let (args, session, volume) = (run.args, run.session, &run.volume);
-    let settings = &run.probes.query.weights;
-    let query = Query { volume, settings };
+fn render_camera<A: Answers>(run: &Run<A>, camera: &Camera, folder: &Path) -> Result<RenderReport> {
+    let (args, session, probes) = (run.args, run.session, &run.probes);
+    let (query, volume) = (&probes.look_up, probes.volume);
     let bar = session.console.progress.stage("rendering", 3 + VisibilityMode::ALL.len());
     let primary_started = Instant::now();
     let view = see(run.world, camera, args.view.size.width, args.view.size.height, session.seed);
@@ -130,18 +243,21 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
     tell::too_bright(session.console, view.clamped(), ["point of the picture", "points of the picture"]);
     bar.inc(1);
     let scenery = Scenery { world: run.world, view: &view, primary_s, seed: session.seed };
-    let (masks, masks_s) = scenery.masks(&query);
+    let (masks, masks_s) = scenery.masks(query);
     bar.inc(1);
-    let air = scenery.air(&query);
+    let air = scenery.air(query);
     bar.inc(1);
     let seen = Seen { masks: &masks, masks_s, air: &air };
-    let mut shaded = scenery.shade(&query, seen, run.probes.runtime_bytes(), || bar.inc(1));
+    let mut shaded = scenery.shade(query, seen, probes.bytes_per_probe, || bar.inc(1));
     // What is left of the error when the probes are right and visibility exact comes from interpolation between probes.
-    let mut path_traced = run.truth.as_ref().map(|BakedTruth { truth, .. }| {
+    let mut path_traced = run.truth.as_ref().zip(probes.settings).map(|(BakedTruth { truth, .. }, settings)| {
         let query = Query { volume: &truth.volume, settings };
         scenery.shade_again(&query, seen, VisibilityMode::Ray, PATH_RAY, &shaded[2].report)
     });
-    let fitted = run.probes.fit.is_some();
+    let of_engine =
+        |(to, written, bytes): &(Target, Written, f64)| scenery.shade_as(written, to.method(), &air, *bytes);
+    let mut as_engine = probes.also.as_ref().map(of_engine);
+    let fitted = probes.is_fitted;
     let baked = run.truth.as_ref().filter(|_| !fitted).map(|t| t.report.clone());
     for s in &mut shaded {
         s.report.leak.baked = baked.as_ref().and_then(|b| b.figures.light);
@@ -151,17 +267,20 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
     let reference = Reference::obtain(run.reference.as_ref(), shot, args.allow_scene_change)?;
     let exposure_ev = args.exposure.unwrap_or_else(|| exposure(&shaded[2], reference.as_ref()));
     if let Some(reference) = &reference {
-        compare(run, reference, exposure_ev, shaded.iter_mut().chain(&mut path_traced));
+        let all = shaded.iter_mut().chain(&mut path_traced).chain(&mut as_engine);
+        compare(session, reference, exposure_ev, all);
     }
     if let Some(spp) = args.reference {
         let truth = air.truth(run.world, spp, session.seed);
-        shaded.iter_mut().chain(&mut path_traced).for_each(|shaded| shaded.compare_in_air(&air, &truth));
+        let all = shaded.iter_mut().chain(&mut path_traced).chain(&mut as_engine);
+        all.for_each(|shaded| shaded.compare_in_air(&air, &truth));
     }
     create_folder(folder)?;
-    pictures::write(volume, (camera, &view), &shaded, reference.as_ref(), exposure_ev, folder)?;
+    let shown = (&shaded, as_engine.as_ref());
+    pictures::write(volume, (camera, &view), shown, reference.as_ref(), exposure_ev, folder)?;
     let report = RenderReport {
-        header: session.header(SCHEMA, "render", run.probes.config.clone()),
-        bake_seed: run.probes.seed,
+        header: session.header(SCHEMA, "render", probes.config.to_owned()),
+        bake_seed: probes.seed,
         scene_changed: session.scene_changed,
         camera: camera.name.clone(),
         width: view.width,
@@ -182,7 +301,8 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
         baked,
         fitted,
         baked_reason: (fitted && run.truth.is_some()).then_some(baked::FITTED),
-        methods: shaded.into_iter().chain(path_traced).map(|s| s.report).collect(),
+        export: probes.export.map(Target::name),
+        methods: shaded.into_iter().chain(path_traced).chain(as_engine).map(|s| s.report).collect(),
     };
     write_json(&folder.join("report.json"), &report)?;
     tell::rendered(session.console, &report);
@@ -191,10 +311,15 @@ fn render_camera(run: &Run, camera: &Camera, folder: &Path) -> Result<RenderRepo
 }
 
 /// Adds the figures that need a reference.
-fn compare<'s>(run: &Run, reference: &Reference, exposure_ev: f32, shaded: impl Iterator<Item = &'s mut Shaded>) {
+fn compare<'s>(
+    session: &Session,
+    reference: &Reference,
+    exposure_ev: f32,
+    shaded: impl Iterator<Item = &'s mut Shaded>,
+) {
     let Reference { layers, regions, glossy, .. } = reference;
-    let comparison = Comparison { layers, regions, glossy: *glossy, exposure_ev, seed: run.session.seed };
-    let bar = run.session.console.progress.stage("comparing", VisibilityMode::ALL.len());
+    let comparison = Comparison { layers, regions, glossy: *glossy, exposure_ev, seed: session.seed };
+    let bar = session.console.progress.stage("comparing", VisibilityMode::ALL.len());
     shaded.for_each(|shaded| {
         shaded.compare(&comparison);
         bar.inc(1);

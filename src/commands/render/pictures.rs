@@ -28,7 +28,7 @@ const PROBE_KEY: &[Entry] = &[
 pub fn write(
     volume: &Volume,
     (camera, view): (&Camera, &View),
-    shaded: &[Shaded; 3],
+    (shaded, as_engine): (&[Shaded; 3], Option<&Shaded>),
     reference: Option<&Reference>,
     exposure_ev: f32,
     folder: &Path,
@@ -38,9 +38,9 @@ pub fn write(
         Some(picture) => picture.tonemapped(exposure_ev),
         None => Picture8::filled(view.width, view.height, [0; 3]),
     };
-    for s in shaded {
-        s.image.write_exr(&file(s.mode.name(), "exr"))?;
-        tonemapped(&s.image).write_png(&file(s.mode.name(), "png"))?;
+    for s in shaded.iter().chain(as_engine) {
+        s.image.write_exr(&file(s.report.name, "exr"))?;
+        tonemapped(&s.image).write_png(&file(s.report.name, "png"))?;
     }
     let [off, on, exact] = shaded;
     let difference = |s: &Shaded| {

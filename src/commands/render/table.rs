@@ -54,10 +54,16 @@ pub fn table(report: &RenderReport) -> String {
     text.extend(report.methods.iter().map(|method| format!("\n{}", air_line(method))));
     let baked = report.baked.as_ref().filter(|b| b.figures.bias.is_some()).map(baked_line);
     if report.fitted {
-        text.push_str(&format!(
-            "\n{UNFIT}: fitted values are right with the visibility that they were fitted with, so this row says nothing of \
-             the method; bake with --preset physical to see what visibility does"
-        ));
+        text.push_str(&match report.export {
+            None => format!(
+                "
+{UNFIT}: fitted values are right with the visibility that they were fitted with, so this row says nothing of \
+                 the method; bake with --preset physical to see what visibility does"
+            ),
+            Some(_) => "
+fitted to the engine's look-up: exact visibility, and leaks against it, say nothing of it"
+                .to_owned(),
+        });
     }
     let reason = report.baked_reason.map(|reason| format!("no figure of the bake itself: {reason}"));
     for line in error_lines(report, mean).into_iter().chain(baked).chain(reason) {

@@ -1,0 +1,59 @@
+//! Volumes of rooms in scenes of the repository.
+
+use std::path::Path;
+
+use glam::Vec3;
+
+use crate::export::rooms;
+use crate::light::World;
+use crate::probe::lattice::ProbeState;
+use crate::probe::lattice::grid::GridSettings;
+use crate::probe::store::sh::ShStore;
+use crate::probe::store::{IrradianceStore, Occlusion};
+use crate::probe::{Grid, Volume};
+use crate::scene::{self, LoadOptions, Scene};
+
+/// Every active probe at its grid point.
+fn in_scene(name: &str, spacing: f64) -> (Scene, Volume) {
+    let path = format!("{}/scenes/{name}.glb", env!("CARGO_MANIFEST_DIR"));
+    let scene = scene::load(Path::new(&path), &LoadOptions::default()).unwrap();
+    let settings = GridSettings { spacing_m: Some(spacing), ..Default::default() };
+    let grid = Grid::new(&settings, &scene).unwrap();
+    let count = grid.probe_count();
+    let positions: Vec<Vec3> = grid.probes().map(|probe| grid.grid_point(probe)).collect();
+    // The walls are 0.1 m thick.
+    let (low, high) = scene.mesh.bounds().unwrap();
+    let is_inside = |p: &Vec3| p.cmpgt(low + 0.1).all() && p.cmplt(high - 0.1).all();
+    let state = |p| if is_inside(p) { ProbeState::Active } else { ProbeState::NeverSampled };
+    let own = Volume {
+        states: positions.iter().map(state).collect(),
+        positions,
+        irradiance: IrradianceStore::Sh9(ShStore::default()).zeros(count, 1),
+        occlusion: Occlusion::None,
+        radiance: Default::default(),
+        layout: Default::default(),
+        grid,
+    };
+    (scene, own)
+}
+
+#[test]
+fn closed_rooms_get_a_volume_each() {
+    let rooms_of = |name: &str| {
+        let (scene, own) = in_scene(name, 0.8);
+        let world = World::new(&scene, 1.0, 0.9).unwrap();
+        rooms::rooms(&world, &own)
+    };
+    let sealed = rooms_of("two_rooms_sealed");
+    let [a, b] = sealed[..] else { panic!("two rooms: {sealed:?}") };
+    // 4 × 3 × 4 m each, up to the walls: 0.1 m of wall lie between them. Rays end at surfaces to 0.1 mm.
+    for room in [a, b] {
+        assert!((room.high - room.low - Vec3::new(4.0, 3.0, 4.0)).abs().max_element() < 2e-4, "{room:?}");
+    }
+    assert!(((a.low.x - b.low.x).abs() - 4.1).abs() < 2e-4, "{sealed:?}");
+    let (scene, own) = in_scene("two_rooms_sealed", 0.8);
+    let world = World::new(&scene, 1.0, 0.9).unwrap();
+    assert!(rooms::shared(&world, &own).is_some_and(|warning| warning.contains("two rooms")));
+    let open = rooms_of("two_rooms_open");
+    assert_eq!(open.len(), 1, "one room through the door: {open:?}");
+}

@@ -8,7 +8,7 @@ use crate::math::harmonics;
 use crate::math::octahedral::oct_from_direction;
 use crate::probe::fit::points::Asked;
 use crate::probe::fit::rows::{Row, Rows};
-use crate::probe::fit::{Fitted, ROUNDS, RowSettings, solve};
+use crate::probe::fit::{Fitted, ROUNDS, RowSettings, firmness, solve};
 use crate::probe::query::{Answers, CornerWeights, Part, QueryPoint, Visibility};
 use crate::probe::{Grid, ProbeIndex};
 
@@ -179,14 +179,13 @@ impl Fitted for Grids {
         let oct = oct_from_direction(asked.query.normal);
         let mut parts = Vec::with_capacity(8);
         self.each_share(&asked.query, |probe, share| parts.push(Part { probe, share, oct, offset: Vec3::ZERO }));
-        Row { parts, target, weight: asked.weight }
+        Row { parts, target, noise: 0.0, weight: asked.weight }
     }
 
     fn solve(&mut self, rows: Vec<Row>, settings: &RowSettings) -> u32 {
         let (factors, unknowns) = (self.rules.factors(), self.rules.unknowns());
         let rows = Rows::new(&factors, self.positions.len(), unknowns, rows.into_iter());
-        let stiffness = |i: usize| f64::from(settings.lambda) * factors.stiffness(i % unknowns);
-        let lambda = (0..self.values.len()).map(stiffness).collect();
+        let lambda = firmness(&rows, &factors, &self.values, settings.lambda);
         let task = solve::Task { rows: &rows, prior: &self.values, lambda, iterations: settings.iterations };
         let solved = task.solve(if self.rules.is_signed() { 0 } else { ROUNDS });
         let asked = rows.asked();

@@ -19,6 +19,8 @@ pub struct Row {
     pub parts: Vec<Part>,
     /// W·m⁻².
     pub target: Vec3,
+    /// Variance of the target by the noise of its paths, mean of the channels.
+    pub noise: f32,
     pub weight: f32,
 }
 
@@ -34,7 +36,7 @@ impl Row {
         let query = Query { volume, settings: query };
         let weights = query.weights(&asked.query, asked.visibility);
         let parts = if weights.total() > 0.0 { query.parts(&weights, &asked.query) } else { Vec::new() };
-        Row { parts, target, weight: asked.weight }
+        Row { parts, target, noise: 0.0, weight: asked.weight }
     }
 }
 
@@ -46,6 +48,7 @@ pub struct Rows<'f, 'i> {
     start: Vec<u32>,
     parts: Vec<Part>,
     targets: Vec<Vec3>,
+    noise: Vec<f32>,
     weights: Vec<f32>,
     /// Parts of probe p with their rows: `of_probe[probe_start[p]..probe_start[p + 1]]`, in the order of the rows.
     probe_start: Vec<u32>,
@@ -58,11 +61,12 @@ const CHUNK: usize = 64;
 impl<'f, 'i> Rows<'f, 'i> {
     pub fn new(factors: &'f Factors<'i>, probes: usize, unknowns: usize, rows: impl Iterator<Item = Row>) -> Self {
         let (mut start, mut parts) = (vec![0], Vec::new());
-        let (mut targets, mut weights) = (Vec::new(), Vec::new());
+        let (mut targets, mut noise, mut weights) = (Vec::new(), Vec::new(), Vec::new());
         for row in rows {
             parts.extend(row.parts);
             start.push(parts.len() as u32);
             targets.push(row.target);
+            noise.push(row.noise);
             weights.push(row.weight);
         }
         let mut probe_start = vec![0u32; probes + 1];
@@ -77,7 +81,7 @@ impl<'f, 'i> Rows<'f, 'i> {
                 *next += 1;
             }
         }
-        Rows { factors, unknowns, start, parts, targets, weights, probe_start, of_probe }
+        Rows { factors, unknowns, start, parts, targets, noise, weights, probe_start, of_probe }
     }
 
     /// Which probes any row asks.
@@ -120,6 +124,26 @@ impl<'f, 'i> Rows<'f, 'i> {
 
     pub fn targets(&self) -> &[Vec3] {
         &self.targets
+    }
+
+    /// For each probe how noisy its rows are: variance by noise ÷ mean square of what they are beyond the prior without that noise,
+    /// each row weighed by the probe's share in it.
+    pub fn noisiness(&self, prior: &[DVec3]) -> Vec<f64> {
+        /// Share of the square that is taken for more than noise at least.
+        const LEAST_KNOWN: f64 = 0.02;
+        let found = self.times(prior);
+        let of_probe = |p: usize| {
+            let (mut noise, mut square) = (0.0, 0.0);
+            for &(part, row) in self.parts_of(p) {
+                let (share, row) = (f64::from(self.parts[part as usize].share), row as usize);
+                let weight = f64::from(self.weights[row]) * share * share;
+                let beyond = self.targets[row].as_dvec3() - found[row];
+                noise += weight * f64::from(self.noise[row]);
+                square += weight * beyond.length_squared() / 3.0;
+            }
+            if square > 0.0 { noise / (square - noise).max(LEAST_KNOWN * square) } else { 0.0 }
+        };
+        (0..self.probes()).into_par_iter().map(of_probe).collect()
     }
 
     /// What the look-ups give: A·x.

@@ -17,6 +17,8 @@ use crate::math::random::Purpose;
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Target {
     pub runs: [Vec3; 2],
+    /// Variance of the first run's mean, as if its paths were independent; mean of the channels.
+    pub noise: f32,
 }
 
 impl Target {
@@ -52,7 +54,7 @@ pub fn trace(
         }
         let runs = if asked.is_held_out { 2 } else { 1 };
         for run in 0..runs {
-            let mut sum = Vec3::ZERO;
+            let (mut sum, mut squares) = (Vec3::ZERO, 0.0);
             for sample in 0..settings.paths {
                 // Blocks of two runs are of different parity.
                 let block = u64::from(2 * (sample / BLOCK) + run);
@@ -61,11 +63,18 @@ pub fn trace(
                 let query = &asked.query;
                 let gathered = world.gather(&asked.surface, query.normal, query.view, &path, &mut numbers, &mut rays);
                 match gathered.irradiance.is_finite() {
-                    true => sum += gathered.irradiance,
+                    true => {
+                        sum += gathered.irradiance;
+                        squares += gathered.irradiance.length_squared() / 3.0;
+                    }
                     false => non_finite += 1,
                 }
             }
-            target.runs[run as usize] = sum / settings.paths as f32;
+            let count = settings.paths as f32;
+            target.runs[run as usize] = sum / count;
+            if run == 0 && settings.paths > 1 {
+                target.noise = (squares / count - (sum / count).length_squared() / 3.0).max(0.0) / (count - 1.0);
+            }
         }
         if runs == 1 {
             target.runs[1] = target.runs[0];

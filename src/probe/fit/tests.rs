@@ -353,7 +353,8 @@ fn held_out_points_of_each_kind_have_figures_of_their_own() {
             ..asked_in_air(inside(&volume, &mut random).position, Vec3::Y)
         };
         let asked: Vec<Asked> = points.iter().map(ask).collect();
-        let targets: Vec<_> = points.iter().map(|(.., runs)| targets::Target { runs: runs.map(Vec3::splat) }).collect();
+        let targets: Vec<_> =
+            points.iter().map(|(.., runs)| targets::Target { runs: runs.map(Vec3::splat), noise: 0.0 }).collect();
         figures::residuals(&query, &asked, &targets)
     };
     let surface = [(Kind::Surface, true, [1.0, 1.0]), (Kind::Surface, true, [3.0, 3.0])];
@@ -381,4 +382,24 @@ fn threads_make_no_difference_and_seeds_do() {
     let one = fitted(1, 3);
     assert!(one == fitted(2, 3) && one == fitted(3, 3));
     assert!(one.0 != fitted(1, 4).0);
+}
+
+#[test]
+fn noisy_rows_hold_probes_more_firmly() {
+    let volume = volume(&octahedral(2));
+    let factors = volume.irradiance.factors();
+    let prior = vec![Vec3A::splat(1.0); 27 * 4];
+    // Rows are 2 where the prior gives 1: the square of what is beyond it is 1.
+    let noisiness = |noise: f32| -> Vec<f64> {
+        let rows = rows_of(&volume, 400, |_, _| Vec3::splat(2.0)).into_iter().map(|row| Row { noise, ..row });
+        let rows = Rows::new(&factors, 27, 4, rows);
+        let noisy = rows.noisiness(&prior.iter().map(|x| x.as_dvec3()).collect::<Vec<_>>());
+        let firm = firmness(&rows, &factors, &prior, 0.5);
+        assert!((0..27).all(|p| (firm[4 * p] - 0.5 * (1.0 + 0.4 * noisy[p])).abs() < 1e-9));
+        let asked = rows.asked();
+        (0..27).filter(|&p| asked[p]).map(|p| noisy[p]).collect()
+    };
+    for (noise, expected) in [(0.0, 0.0), (0.5, 1.0), (0.8, 4.0), (1.0, 50.0), (7.0, 350.0)] {
+        assert!(noisiness(noise).iter().all(|n| (n - expected).abs() < 1e-3 * (1.0 + expected)), "{noise}");
+    }
 }

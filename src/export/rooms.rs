@@ -52,7 +52,11 @@ pub struct Blocks {
 /// A block for each room, large ones first. Where probes stand outside of all rooms one of the whole lattice comes before them,
 /// as far as the engine's rules take the last.
 pub fn blocks(world: &World, volume: &Volume, query: &QuerySettings, rules: Rules) -> Blocks {
-    let rooms = without_shells(&rooms(world, volume));
+    let mut rooms = without_shells(&rooms(world, volume));
+    // An engine that takes the mean of all volumes would mix what is closed to what is around it.
+    if !rules.takes_last() {
+        rooms = without_pockets(&rooms);
+    }
     if rooms.len() < 2 {
         let (grids, notes) = one_block(volume, query, rules);
         let warnings = vec!["--volumes auto found no two rooms that are closed to each other: one volume".to_owned()];
@@ -95,14 +99,32 @@ pub fn blocks(world: &World, volume: &Volume, query: &QuerySettings, rules: Rule
     Blocks { grids, notes, warnings }
 }
 
-/// The rooms whose boxes hold no smaller one for the most part: the open air around a house does.
-fn without_shells(rooms: &[Room]) -> Vec<Room> {
-    /// Share of the smaller room.
+/// Whether most of a box lies in another.
+fn holds(outer: &Room, inner: &Room) -> bool {
+    /// Share of the inner one.
     const MOST: f32 = 0.5;
-    let size = |low: Vec3, high: Vec3| (high - low).max(Vec3::ZERO).element_product();
-    let holds = |a: &Room, b: &Room| size(a.low.max(b.low), a.high.min(b.high)) > MOST * size(b.low, b.high);
-    let is_free = |(i, room): &(usize, &Room)| !rooms[i + 1..].iter().any(|smaller| holds(room, smaller));
-    rooms.iter().enumerate().filter(is_free).map(|(_, room)| *room).collect()
+    size(outer.low.max(inner.low), outer.high.min(inner.high)) > MOST * size(inner.low, inner.high)
+}
+
+fn size(low: Vec3, high: Vec3) -> f32 {
+    (high - low).max(Vec3::ZERO).element_product()
+}
+
+/// Rooms, from large to small, without those that consist of others for the most part: the open air around a house does.
+pub fn without_shells(rooms: &[Room]) -> Vec<Room> {
+    /// Share of the shell that the others in it have.
+    const FILLED: f32 = 0.5;
+    let is_room = |(i, room): &(usize, &Room)| {
+        let within = rooms[i + 1..].iter().filter(|other| holds(room, other));
+        within.map(|other| size(other.low, other.high)).sum::<f32>() <= FILLED * size(room.low, room.high)
+    };
+    rooms.iter().enumerate().filter(is_room).map(|(_, room)| *room).collect()
+}
+
+/// The same without those within others: the insides of cupboards.
+pub fn without_pockets(rooms: &[Room]) -> Vec<Room> {
+    let is_room = |(i, room): &(usize, &Room)| !rooms[..*i].iter().any(|larger| holds(larger, room));
+    rooms.iter().enumerate().filter(is_room).map(|(_, room)| *room).collect()
 }
 
 /// Which of the probes around a place are in sight of it.
@@ -122,6 +144,7 @@ fn seen(world: &World, look_up: &Query, contacts: &Contacts, position: Vec3) -> 
 pub fn rooms(world: &World, volume: &Volume) -> Vec<Room> {
     let contacts = Contacts::of_points(world.scene, &volume.positions);
     let spacing = volume.grid.spacing();
+    let scene = world.scene.mesh.bounds().unwrap_or((Vec3::NEG_INFINITY, Vec3::INFINITY));
     let room = |own: &Vec<usize>| {
         let viewpoint = |probe: usize| contacts.viewpoint(probe, volume.positions[probe]);
         let reaches: Vec<[[End; 3]; 2]> =
@@ -134,7 +157,8 @@ pub fn rooms(world: &World, volume: &Volume) -> Vec<Room> {
             Vec3::from([0, 1, 2].map(face))
         };
         let (low, high) = (along(0, -1.0), along(1, 1.0));
-        Room { low, high, probes: own.len() }
+        // Air beyond the scene lights nothing.
+        Room { low: low.max(scene.0), high: high.min(scene.1), probes: own.len() }
     };
     let mut rooms: Vec<Room> = members(world, volume).iter().map(room).collect();
     rooms.retain(|room| ((room.high - room.low) / spacing).min_element() > THINNEST);

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use crate::export::rooms;
+use crate::export::rooms::{self, Room};
 use crate::light::World;
 use crate::probe::lattice::ProbeState;
 use crate::probe::lattice::grid::GridSettings;
@@ -56,4 +56,14 @@ fn closed_rooms_get_a_volume_each() {
     assert!(rooms::shared(&world, &own).is_some_and(|warning| warning.contains("two rooms")));
     let open = rooms_of("two_rooms_open");
     assert_eq!(open.len(), 1, "one room through the door: {open:?}");
+}
+
+#[test]
+fn open_air_and_cupboards_are_no_rooms() {
+    let room = |low: [f32; 3], high: [f32; 3]| Room { low: Vec3::from(low), high: Vec3::from(high), probes: 9 };
+    let (air, a) = (room([-0.5; 3], [9.5, 3.5, 4.5]), room([0.0; 3], [5.0, 3.0, 4.0]));
+    let (b, cupboard) = (room([5.2, 0.0, 0.0], [9.0, 3.0, 4.0]), room([1.0, 0.0, 1.0], [2.0, 2.0, 2.0]));
+    // The two rooms are 105.6 of the 200 m³ of the air around them; the cupboard is 2 of the 60 m³ of its room.
+    assert_eq!(rooms::without_shells(&[air, a, b, cupboard]), [a, b, cupboard]);
+    assert_eq!(rooms::without_pockets(&[a, b, cupboard]), [a, b]);
 }

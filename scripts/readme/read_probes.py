@@ -154,24 +154,14 @@ class Probes:
         def number(i):
             return int(words[i]) | int(words[i + 1]) << 16
 
-        def part(v):
-            at, i = [*v, facing], root
-            while (word := int(words[i])) < 1 << 15:
-                below, distance = at[word >> 13] < (word >> 8 & 31), word & 255
-                if distance == 0:
-                    i += 3 if below else number(i + 1)
-                else:
-                    i += 1 if below else distance
-            return i
-
-        own = part(voxel)
-        mask = int(words[own]) & 255
-        if mask == 0:
-            # Only what surfaces see there counts.
-            mask_of = lambda v: 0 if (word := int(words[part(v)])) & 1 << 13 else word & 255
-            mask = self.beside(voxel, fraction, n, mask_of)
-        far = mask == 0 and int(words[own]) & 1 << 14
-        return mask, number(own + 1) if far else None
+        at, i = [*voxel, facing], root
+        while (word := int(words[i])) < 1 << 15:
+            below, distance = at[word >> 13] < (word >> 8 & 31), word & 255
+            if distance == 0:
+                i += 3 if below else number(i + 1)
+            else:
+                i += 1 if below else distance
+        return word & 255, number(i + 1) if word & 1 << 14 else None
 
     def beside(self, voxel, fraction, n, mask_of):
         """Mask of the voxel across a border that is near, 0 where there is none that sees anything."""

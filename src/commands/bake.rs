@@ -278,6 +278,7 @@ fn summary(report: &BakeReport, config: &Config, output: &Path) -> String {
         ("survey", format::seconds(t.survey)),
         ("capture", format::seconds(t.capture)),
         ("bounce time", format::seconds(t.bounces)),
+        ("fit", if report.fit.is_some() { format::seconds(t.fit) } else { format::UNDEFINED.to_owned() }),
         ("total", format::seconds(t.total)),
         ("memory per probe", format::bytes(report.bytes_per_probe.runtime_kept.round() as u64)),
         ("peak memory", format::bytes(report.peak_memory_bytes)),

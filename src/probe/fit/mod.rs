@@ -141,7 +141,7 @@ pub fn fit_rows(volume: &mut Volume, rows: impl Iterator<Item = Row>, settings: 
 /// noise would make blotches of it.
 pub fn firmness(rows: &Rows, factors: &Factors, prior: &[Vec3A], lambda: f32) -> Vec<f64> {
     /// Of λ, for each unit of [`Rows::noisiness`]. From 0 to 0.6 errors in pictures of two_rooms_open, thin_wall, cornell, courtyard
-    /// and veach_ajar change by −1, +1, +5, +6 and 0 %; pixels more than a quarter off exact visibility fall by a third to a half.
+    /// and veach_ajar change by −1, +1, +5, +6 and 0 %, at 0.4 that of bathroom by +6 %; pixels more than a quarter off exact visibility fall by a third to a half.
     const PER_NOISE: f64 = 0.4;
     let before: Vec<DVec3> = prior.iter().map(|x| x.as_dvec3()).collect();
     let firm: Vec<f64> = rows.noisiness(&before).iter().map(|noisy| 1.0 + PER_NOISE * noisy).collect();

@@ -45,7 +45,7 @@ pub struct TableTest {
     /// nearest entry within this many voxels stands in. 1 or 6: no change of leaks above 1e-4 in the six scenes of
     /// [`crate::probe::place`]'s settings.
     pub reach_voxels: u32,
-    /// Points nearer to a voxel's border than this share of its side may use the voxel beyond, where their own sees no
+    /// Of such a file: points nearer to a voxel's border than this share of its side may use the voxel beyond, where their own sees no
     /// probe: where walls meet, the survey may miss a strip much narrower than a voxel. 0.1 or 0.5: at most 3e-4 (thin_wall).
     pub strip: f32,
 }

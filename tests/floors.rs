@@ -89,7 +89,7 @@ fn imports() -> BTreeMap<Module, BTreeSet<Module>> {
         let targets = named.paths.iter().filter_map(|path| file_of(path)).filter(|target| target != module).collect();
         (module.clone(), targets)
     };
-    found.iter().filter(|(module, _)| module.last().is_none_or(|name| name != "tests")).map(of).collect()
+    found.iter().filter(|(module, _)| !module.iter().any(|name| name == "tests")).map(of).collect()
 }
 
 /// The floor of every top-level module: the groups of `lib.rs`.

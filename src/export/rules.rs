@@ -77,6 +77,23 @@ impl Rules {
         self == Rules::Three
     }
 
+    /// Weight of rows in the air in its fit, where nothing else is asked for. Between walls these look-ups give either surfaces or
+    /// the air their due. With 0.1 the air of two_rooms_open at 1 m errs 1.19 times as much as without a fit by Bevy's rules, with
+    /// 0.3 1.15 and with 1 1.07 times; the light in the dark room of two_rooms_sealed is 1.4, 1.9 and 3.4 % of that in the lit one.
+    pub fn air_weight(self) -> f32 {
+        match self {
+            Rules::Three | Rules::Bevy => 0.3,
+        }
+    }
+
+    /// Blocks that count at once, if there is a limit: `MAX_VIEW_LIGHT_PROBES` of Bevy (`light_probe/mod.rs`).
+    pub fn most_blocks(self) -> Option<usize> {
+        match self {
+            Rules::Three => None,
+            Rules::Bevy => Some(8),
+        }
+    }
+
     /// What is shown of a sum.
     #[inline]
     pub fn shown(self, sum: Vec3) -> Vec3 {

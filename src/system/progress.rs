@@ -54,7 +54,7 @@ const CLOCK: &str = "{prefix:>12} {spinner} {elapsed_precise} {wide_msg}";
 
 /// What is left in words, where that is known.
 fn left(share: f32, elapsed: Duration, eta: Duration) -> String {
-    if share < LEAST_SHARE || share >= 1.0 || elapsed < LEAST_TIME {
+    if !(LEAST_SHARE..1.0).contains(&share) || elapsed < LEAST_TIME {
         return String::new();
     }
     let seconds = eta.as_secs();

@@ -136,6 +136,8 @@ mod tests {
         let markdown = "| a \\| b | c |\n|---|--:|\n| long words | 1 |\n";
         assert_eq!(text(markdown, 20), "a | b       c\nlong words  1");
         assert_eq!(text(markdown, 10), "long words\n    1");
-        assert_eq!(text("| a | b | c |\n|-|-|-|\n| x | 10 | 20 |", 8), "x\n    b: 10\n    c: 20");
+        let markdown = "| a | b | c | d |\n|-|-|-|-|\n| x | 10 | 20 | 30 |";
+        assert_eq!(text(markdown, 13), "a  b   c   d\nx  10  20  30");
+        assert_eq!(text(markdown, 10), "x\n    b: 10\n    c: 20\n    d: 30");
     }
 }

@@ -61,7 +61,9 @@ fn left(share: f32, elapsed: Duration, eta: Duration) -> String {
     let mut text = ", ".to_owned();
     // Writing to a string cannot fail.
     let _ = match seconds {
-        0..60 => write!(text, "{seconds} s left"),
+        // What takes no time is not worth a word.
+        0 => return String::new(),
+        1..60 => write!(text, "{seconds} s left"),
         60..3600 => write!(text, "{} min left", seconds.div_ceil(60)),
         _ => write!(text, "{:.1} h left", seconds as f64 / 3600.0),
     };

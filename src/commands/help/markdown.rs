@@ -1,5 +1,7 @@
 //! Markdown of the READMEs as text for a terminal: wrapped, tables set or taken apart, pictures left out.
 
+use crate::system::terminal::wrapped;
+
 /// Columns between the cells of a table.
 const GAP: usize = 2;
 
@@ -72,24 +74,6 @@ fn cells(row: &str) -> Vec<String> {
     let row = row.trim().trim_start_matches('|').replace("\\|", HELD);
     let row = row.strip_suffix('|').unwrap_or(&row);
     row.split('|').map(|cell| plain(&cell.trim().replace(HELD, "|"))).collect()
-}
-
-/// Lines of at most `width` columns; all but the first begin with `hanging` blanks.
-fn wrapped(text: &str, width: usize, hanging: usize) -> Vec<String> {
-    let mut lines = Vec::new();
-    let mut line = String::new();
-    for word in text.split_whitespace() {
-        if line.trim().is_empty() {
-            line.push_str(word);
-        } else if line.chars().count() + 1 + word.chars().count() <= width {
-            line.push(' ');
-            line.push_str(word);
-        } else {
-            lines.push(std::mem::replace(&mut line, format!("{:hanging$}{word}", "")));
-        }
-    }
-    lines.push(line);
-    lines
 }
 
 /// Columns where they fit; else each row as its first cell with the others below it.

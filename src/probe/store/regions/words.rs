@@ -86,7 +86,7 @@ impl Plane {
 
     /// The layer of voxels that it lies in.
     pub fn layer(self, voxels_per_cell: u32) -> u8 {
-        (u32::from(self.place) * voxels_per_cell >> 16) as u8
+        ((u32::from(self.place) * voxels_per_cell) >> 16) as u8
     }
 
     pub fn words(self) -> [u16; 2] {

@@ -6,7 +6,7 @@ use anyhow::{Result, ensure};
 use glam::Vec3;
 use serde_json::{Value, json};
 
-use super::{Console, tell};
+use super::{Console, kinds, tell};
 use crate::cli::InspectArgs;
 use crate::plan::stage_in_words;
 use crate::probe::file::published::threev8_bytes;
@@ -22,6 +22,7 @@ use crate::system::format;
 const DIGITS: usize = 6;
 
 pub fn run(args: &InspectArgs, console: &Console) -> Result<()> {
+    kinds::expect_probes(&args.probes, "inspect PROBES")?;
     let started = Instant::now();
     let file = file::read(&args.probes)?;
     tell::probes(console, &args.probes, &file);

@@ -5,7 +5,10 @@ mod camera;
 pub mod convert;
 pub mod diff_report;
 pub mod export;
+mod grid_advice;
+pub mod help;
 pub mod inspect;
+mod kinds;
 pub mod reference;
 pub mod render;
 mod session;
@@ -19,6 +22,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 
 use crate::cli::{Cli, Command, OutputFlags, PictureSize};
+use crate::system::interrupt;
 use crate::system::memory::{TooLittleMemory, check_available};
 use crate::system::output::write_atomically;
 use crate::system::progress::Progress;
@@ -82,6 +86,7 @@ pub enum Outcome {
 
 /// Runs the command that was typed.
 pub fn run(cli: Cli) -> Result<Outcome> {
+    interrupt::listen();
     let console = Console::new(&cli.output);
     match cli.command {
         Command::Bake(args) => bake::run(&args, &console)?,
@@ -92,6 +97,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Convert(args) => convert::run(&args, &console)?,
         Command::Export(args) => export::run(&args, &console)?,
         Command::Inspect(args) => inspect::run(&args, &console)?,
+        Command::Help(args) => help::run(&args, &console)?,
     }
     Ok(Outcome::Done)
 }

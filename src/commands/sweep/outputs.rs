@@ -14,6 +14,7 @@ use crate::system::output::write_atomically;
 pub const FILES: &[&str] = &[
     super::reference::FILE,
     super::sheet::FILE,
+    super::page::FILE,
     "sweep.json",
     "sweep.csv",
     "error_time.svg",

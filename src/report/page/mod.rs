@@ -11,7 +11,7 @@ mod histogram;
 mod images;
 mod pack;
 mod shrink;
-mod still;
+pub mod still;
 mod view;
 mod visible;
 
@@ -22,6 +22,7 @@ pub use data::{Command, ConfigChange, PageError, PairPixels};
 pub use embed::MOST_PIXELS;
 pub use histogram::histogram;
 pub use images::PackedImage;
+pub use shrink::PixelExtent;
 
 use crate::report::gate::Gate;
 
@@ -72,6 +73,7 @@ mod tests {
             candidate: Some(1.0),
             value: Some(2.0),
             unit: "%",
+            side_unit: "",
             threshold: Some(1.0),
             margin: Some(-1.0),
             standard_error: Some(0.1),

@@ -56,11 +56,14 @@ pub fn view(report: Value, gates: &[Gate], packed: Vec<PackedImage>) -> Value {
             ..Value::from(Serde(gate))
         }
     };
+    let images = images(packed);
+    let worst = worst(gates, &images);
     // From the low to the high end, RGB bytes.
     let colors: Vec<u8> = (0..COLORS).flat_map(|i| color_at(i as f64 / (COLORS - 1) as f64)).collect();
     context! {
         gates => gates.iter().map(gate).collect::<Vec<_>>(),
-        images => images(packed),
+        images,
+        worst,
         colors => STANDARD.encode(colors),
         codes => context! {
             per_octave => codes::PER_OCTAVE,
@@ -71,6 +74,15 @@ pub fn view(report: Value, gates: &[Gate], packed: Vec<PackedImage>) -> Value {
         },
         ..report
     }
+}
+
+/// The place of the pair that the first gate about pictures is of: they come worst first. Without such a gate the first pair.
+fn worst(gates: &[Gate], images: &[Value]) -> usize {
+    let of_gate = |gate: &Gate| {
+        let is_of = |image: &Value| image.get_attr("name").is_ok_and(|name| name.as_str() == Some(&gate.item));
+        images.iter().position(is_of)
+    };
+    gates.iter().find_map(of_gate).unwrap_or(0)
 }
 
 /// A threshold as somebody wrote it: without the zeros that make figures as long as each other.
@@ -84,7 +96,11 @@ fn threshold(value: Option<f64>, unit: &str) -> String {
 
 /// The figure of one side of a gate.
 fn of_side(value: Option<f64>, unit: &str) -> String {
-    if unit == words::BYTES { words::of_side(value, unit) } else { format::or_undefined(value, number) }
+    match unit {
+        "" => format::or_undefined(value, number),
+        words::BYTES => words::of_side(value, unit),
+        unit => format::or_undefined(value, |value| format!("{} {unit}", number(value))),
+    }
 }
 
 /// A pure number: what is whole is most likely counted, and shown without a fraction.

@@ -108,7 +108,7 @@ pub fn run_on(
         rows: chosen.len(),
         rows_held_out: count(|a| a.is_held_out),
         rows_dropped: count(|a| !a.is_fitted),
-        paths: settings.paths,
+        paths: chosen.iter().map(|&i| f64::from(targets[i].paths)).sum::<f64>() / chosen.len().max(1) as f64,
         iterations,
         held_out_before: before.surface,
         held_out_after: after.surface,

@@ -5,7 +5,7 @@ use glam::{DVec3, UVec3, Vec3};
 use super::words::{AXIS_SHIFT, THRESHOLD_SHIFT, wall_axis};
 use super::*;
 use crate::math::random::{Purpose, Random};
-use crate::probe::store::surface::{TableTest, key};
+use crate::probe::store::surface::{Entry, TableTest, key};
 
 fn grid() -> Grid {
     Grid::from_parts(DVec3::ZERO, Vec3::ONE, UVec3::new(3, 2, 2)).unwrap()
@@ -284,4 +284,45 @@ fn things_beside_a_thin_wall_see_what_is_on_their_side() {
     let mut container = Container::default();
     write(&regions, &mut container);
     assert_eq!((regions.parts(), read(&container, &grid)), (2 + usize::from(grid.cell_count() > 1), Ok(regions)));
+}
+
+/// Whatever walls there are, files come back, and surfaces get what the table says.
+#[test]
+fn walls_change_nothing_for_surfaces() {
+    let grid = grid();
+    let n = 8;
+    let mut divided = 0;
+    for seed in 0..100 {
+        let table = table(n, 0.3, &[0x0f, 0xf0, 0x33, 0xff], seed);
+        let mut random = Random::new(seed, Purpose::FitPoints, 3, 0);
+        let mut walls = Vec::new();
+        for _ in 0..1 + random.bits() % 4 {
+            let plane = Plane { axis: random.bits() as usize % 3, place: random.bits() as u16 };
+            let place = plane.share() * n as f32;
+            let side = |entry: Entry| {
+                let low = entry.voxel[plane.axis] as f32;
+                match (low + 1.0 <= place, low >= place) {
+                    (true, _) => BELOW,
+                    (_, true) => BEYOND,
+                    _ => BELOW | BEYOND,
+                }
+            };
+            walls.push(Wall { plane, sides: table.entries(CellIndex(0)).map(side).collect() });
+        }
+        let air = air_places(n).map(|_| 1 + (random.bits() % 255) as u8).collect();
+        let plain = whole(&table);
+        let regions = Regions::new(&grid, &table, &open(&table), &[air], &[walls]);
+        divided += usize::from(regions != plain);
+        let (low, sides) = grid.cell_box(CellIndex(0));
+        for entry in table.entries(CellIndex(0)) {
+            let at = low + (entry.voxel.as_vec3() + Vec3::new(0.3, 0.5, 0.7)) / n as f32 * sides;
+            let facing = Facing::of(entry.facing);
+            let asked = |regions: &Regions| regions.look_up(&grid, &grid.cell(at), at, facing);
+            assert_eq!(asked(&regions), asked(&plain), "{seed} {entry:?}");
+        }
+        let mut container = Container::default();
+        write(&regions, &mut container);
+        assert_eq!(read(&container, &grid), Ok(regions), "{seed}");
+    }
+    assert!(divided > 50, "{divided}");
 }

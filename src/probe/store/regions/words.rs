@@ -111,8 +111,8 @@ impl Part {
         Part { low: [0; 4], high: [n, n, n, Facing::ALL.len() as u8], walls: MOST_WALLS }
     }
 
-    /// Below and beyond the plane of a word with those behind it; `None` where the plane does not divide the box. The voxels at a
-    /// wall are on both sides: those that it passes through, and the next, for it may lie between.
+    /// Below and beyond the plane of a word with those behind it; `None` where the plane does not divide the box, or there are too
+    /// many walls. The voxels at a wall are on both sides: those that it passes through, and the next, for it may lie between.
     pub fn divided(self, word: u16, behind: &[u16], voxels_per_cell: u32) -> Option<[Part; 2]> {
         let (mut below, mut beyond) = (self, self);
         let Some(axis) = wall_axis(word) else {
@@ -121,13 +121,14 @@ impl Part {
             return (self.low[axis] < threshold && threshold < self.high[axis]).then_some([below, beyond]);
         };
         let layer = Plane { axis, place: *behind.first()? }.layer(voxels_per_cell);
-        let divides = axis < FACINGS && self.walls > 0 && (self.low[axis]..self.high[axis]).contains(&layer);
-        if divides {
+        let left = self.walls.checked_sub(1).filter(|_| axis < FACINGS)?;
+        (below.walls, beyond.walls) = (left, left);
+        // A wall that lies beyond the part leaves all of it on either side: what is in the wall itself is on both.
+        if (self.low[axis]..self.high[axis]).contains(&layer) {
             below.high[axis] = below.high[axis].min(layer + 2);
             beyond.low[axis] = beyond.low[axis].max(layer.saturating_sub(1));
         }
-        (below.walls, beyond.walls) = (self.walls.saturating_sub(1), self.walls.saturating_sub(1));
-        divides.then_some([below, beyond])
+        Some([below, beyond])
     }
 
     pub fn places(self) -> u64 {

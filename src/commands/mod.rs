@@ -26,6 +26,7 @@ use crate::system::interrupt;
 use crate::system::memory::{TooLittleMemory, check_available};
 use crate::system::output::write_atomically;
 use crate::system::progress::Progress;
+use crate::system::terminal;
 
 /// How a command speaks to its user: results on standard output, all else on standard error.
 #[derive(Debug, Clone, Copy)]
@@ -63,7 +64,9 @@ impl Console {
 
     /// Prints a result. A reader that has gone away (`| head`) is no error, and changes nothing of what is done.
     pub fn print(&self, text: &str) -> Result<()> {
-        match writeln!(std::io::stdout().lock(), "{}", text.trim_end()) {
+        let text = text.trim_end();
+        let text = if self.json { text.to_owned() } else { terminal::fitted(text) };
+        match writeln!(std::io::stdout().lock(), "{text}") {
             Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
             done => done.context("cannot write to standard output"),
         }

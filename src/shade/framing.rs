@@ -57,14 +57,21 @@ const LIGHT_RAYS: usize = 8;
 const UNLIT: f32 = 0.25;
 
 /// Room around the content in the picture.
-const MARGIN: f32 = 1.05;
+const MARGIN: f32 = 1.1;
 
-/// Chooses a camera, and tells whether it stands inside the scene.
-pub fn frame(world: &World, bounds: (Vec3, Vec3)) -> (Camera, bool) {
+/// Rays along each side of the picture by which the content is made to fill it, and the least field of view for that.
+const FITTING_RAYS: usize = 64;
+const LEAST_FOV_DEG: f32 = 8.0;
+
+/// Width ÷ height of a picture whose size is not known.
+pub const USUAL_ASPECT: f32 = 16.0 / 9.0;
+
+/// Chooses a camera for pictures of this width ÷ height, and tells whether it stands inside the scene.
+pub fn frame(world: &World, bounds: (Vec3, Vec3), aspect: f32) -> (Camera, bool) {
     let (low, high) = content_bounds(&world.scene.mesh).unwrap_or(bounds);
     match inside(world, low, high) {
         Some(camera) => (camera, true),
-        None => (outside(world, low, high), false),
+        None => (outside(world, low, high, aspect), false),
     }
 }
 
@@ -112,30 +119,53 @@ fn inside(world: &World, low: Vec3, high: Vec3) -> Option<Camera> {
 }
 
 /// The view of the content from the side that shows most of it, lit, and hides none of it behind other things.
-fn outside(world: &World, low: Vec3, high: Vec3) -> Camera {
+fn outside(world: &World, low: Vec3, high: Vec3, aspect: f32) -> Camera {
     let centre = (low + high) / 2.0;
     let usual = USUAL_DIRECTION.normalize();
     let place = |direction: Vec3| centre + direction * distance(low, high, direction);
     let margin = (high - low) * 0.1 + f32::MIN_POSITIVE;
+    let is_content = |p: Vec3| p.cmpge(low - margin).all() && p.cmple(high + margin).all();
     let score = |direction: Vec3| {
         let of_ray = |surface: Option<SurfacePoint>| match surface {
             Some(surface) if surface.is_back() => -0.5,
-            Some(surface) => {
-                let position = surface.position;
-                let is_content = position.cmpge(low - margin).all() && position.cmple(high + margin).all();
-                match (is_content, is_lit(world, &surface)) {
-                    (false, _) => 0.0,
-                    (true, true) => 1.0,
-                    (true, false) => UNLIT,
-                }
-            }
+            Some(surface) => match (is_content(surface.position), is_lit(world, &surface)) {
+                (false, _) => 0.0,
+                (true, true) => 1.0,
+                (true, false) => UNLIT,
+            },
             None => 0.0,
         };
         let bonus = if direction == usual { CLEARLY_BETTER } else { 1.0 };
         bonus * small_picture(world, place(direction), -direction).map(of_ray).sum::<f32>()
     };
     let directions = [usual].into_iter().chain(around(&OUTSIDE_PITCHES));
-    camera(place(best_of(directions, score).unwrap_or(usual)), centre)
+    let position = place(best_of(directions, score).unwrap_or(usual));
+    filled(world, position, centre, aspect, is_content)
+}
+
+/// A camera there whose picture the content fills: turned to its middle, with the field of view that it takes.
+fn filled(world: &World, position: Vec3, centre: Vec3, aspect: f32, is_content: impl Fn(Vec3) -> bool) -> Camera {
+    let forward = (centre - position).normalize_or(Vec3::NEG_Z);
+    let right = forward.cross(Vec3::Y).normalize_or(Vec3::X);
+    let (up, slope) = (right.cross(forward), (FOV_Y_DEG.to_radians() / 2.0).tan());
+    // In halves of the picture's height, wide enough for both a wide and a square picture.
+    let towards = |x: f32, y: f32| forward + (right * x + up * y) * slope;
+    let reach = aspect.max(1.0);
+    let at = |k: usize| (k as f32 + 0.5) / FITTING_RAYS as f32 * 2.0 - 1.0;
+    let mut ends: Option<[f32; 4]> = None;
+    for i in 0..FITTING_RAYS * FITTING_RAYS {
+        let (x, y) = (at(i % FITTING_RAYS) * reach, at(i / FITTING_RAYS));
+        let surface = world.surface(Ray::new(position, towards(x, y).normalize(), i as u32));
+        if surface.is_some_and(|surface| is_content(surface.position)) {
+            let [left, right, low, high] = ends.unwrap_or([x, x, y, y]);
+            ends = Some([left.min(x), right.max(x), low.min(y), high.max(y)]);
+        }
+    }
+    let Some([left, right_end, low, high]) = ends else { return camera(position, centre) };
+    let target = position + (centre - position).length() * towards((left + right_end) / 2.0, (low + high) / 2.0);
+    let half = ((high - low) / 2.0).max((right_end - left) / 2.0 / aspect) + 1.0 / FITTING_RAYS as f32;
+    let fov = (2.0 * (slope * half * MARGIN).atan()).clamp(LEAST_FOV_DEG.to_radians(), FOV_Y_DEG.to_radians());
+    Camera::look_at("framed", position, target, fov)
 }
 
 /// Horizontal directions, raised or lowered.

@@ -54,14 +54,16 @@ const CLOCK: &str = "{prefix:>12} {spinner} {elapsed_precise} {wide_msg}";
 
 /// What is left in words, where that is known.
 fn left(share: f32, elapsed: Duration, eta: Duration) -> String {
-    if share < LEAST_SHARE || share >= 1.0 || elapsed < LEAST_TIME {
+    if !(LEAST_SHARE..1.0).contains(&share) || elapsed < LEAST_TIME {
         return String::new();
     }
     let seconds = eta.as_secs();
     let mut text = ", ".to_owned();
     // Writing to a string cannot fail.
     let _ = match seconds {
-        0..60 => write!(text, "{seconds} s left"),
+        // What takes no time is not worth a word.
+        0 => return String::new(),
+        1..60 => write!(text, "{seconds} s left"),
         60..3600 => write!(text, "{} min left", seconds.div_ceil(60)),
         _ => write!(text, "{:.1} h left", seconds as f64 / 3600.0),
     };

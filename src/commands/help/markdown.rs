@@ -1,5 +1,7 @@
 //! Markdown of the READMEs as text for a terminal: wrapped, tables set or taken apart, pictures left out.
 
+use crate::system::terminal::wrapped;
+
 /// Columns between the cells of a table.
 const GAP: usize = 2;
 
@@ -74,24 +76,6 @@ fn cells(row: &str) -> Vec<String> {
     row.split('|').map(|cell| plain(&cell.trim().replace(HELD, "|"))).collect()
 }
 
-/// Lines of at most `width` columns; all but the first begin with `hanging` blanks.
-fn wrapped(text: &str, width: usize, hanging: usize) -> Vec<String> {
-    let mut lines = Vec::new();
-    let mut line = String::new();
-    for word in text.split_whitespace() {
-        if line.trim().is_empty() {
-            line.push_str(word);
-        } else if line.chars().count() + 1 + word.chars().count() <= width {
-            line.push(' ');
-            line.push_str(word);
-        } else {
-            lines.push(std::mem::replace(&mut line, format!("{:hanging$}{word}", "")));
-        }
-    }
-    lines.push(line);
-    lines
-}
-
 /// Columns where they fit; else each row as its first cell with the others below it.
 fn table(rows: &[Vec<String>], width: usize) -> Vec<String> {
     let is_rule = |row: &[String]| row.iter().all(|cell| !cell.is_empty() && cell.chars().all(|c| "-:".contains(c)));
@@ -136,6 +120,8 @@ mod tests {
         let markdown = "| a \\| b | c |\n|---|--:|\n| long words | 1 |\n";
         assert_eq!(text(markdown, 20), "a | b       c\nlong words  1");
         assert_eq!(text(markdown, 10), "long words\n    1");
-        assert_eq!(text("| a | b | c |\n|-|-|-|\n| x | 10 | 20 |", 8), "x\n    b: 10\n    c: 20");
+        let markdown = "| a | b | c | d |\n|-|-|-|-|\n| x | 10 | 20 | 30 |";
+        assert_eq!(text(markdown, 13), "a  b   c   d\nx  10  20  30");
+        assert_eq!(text(markdown, 10), "x\n    b: 10\n    c: 20\n    d: 30");
     }
 }

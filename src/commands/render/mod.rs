@@ -325,10 +325,12 @@ fn render_camera<A: Answers>(run: &Run<A>, camera: &Camera, folder: &Path) -> Re
 /// Warns of a picture that shows next to no light, and of one that shows much that the probes do not reach.
 fn warn_about(camera: &str, exposure_ev: f32, on: &MethodReport, args: &RenderArgs, console: &Console) {
     if args.exposure.is_none() && exposure_ev.abs() > EXTREME_EV {
-        let what = if exposure_ev > 0.0 { "hardly any light" } else { "very much light" };
+        let (what, remedy) = match exposure_ev > 0.0 {
+            true => ("hardly any light", "look from elsewhere (--camera, --look-at), or give a sky (--env)"),
+            false => ("very much light", "lights in lumens want --set lights.punctual_scale=0.001464 in the bake"),
+        };
         console.warn(format!(
-            "camera {camera}: {what} reaches what it sees, the exposure is {exposure_ev:+.1} EV; look from elsewhere \
-             (--camera, --look-at), or check the scene's lights and lights.punctual_scale"
+            "camera {camera}: {what} reaches what it sees, the exposure is {exposure_ev:+.1} EV; {remedy}"
         ));
     }
     if let Some(share) = on.outside_hull.filter(|share| *share > MUCH_OUTSIDE) {

@@ -91,7 +91,7 @@ fn errors_of(method: &MethodReport) -> Option<&ErrorReport> {
 }
 
 /// What the table says of the visibility of fitted probes where it is not that of the fit.
-const UNFIT: &str = "off (not what was fitted)";
+const UNFIT: &str = "off (not fitted)";
 
 fn unfit_line(report: &RenderReport) -> String {
     match report.export {

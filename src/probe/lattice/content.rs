@@ -42,7 +42,7 @@ fn without_tails(mesh: &Mesh, low: Vec3, high: Vec3) -> Option<(Vec3, Vec3)> {
         return None;
     }
     let tail = (mesh.triangles.len() as f32 * FAR_SHARE) as usize;
-    let mut ends = [Vec3::ZERO; 2];
+    let (mut first, mut last) = (Vec3::ZERO, Vec3::ZERO);
     for axis in 0..3 {
         let mut middles: Vec<f32> = mesh
             .triangles
@@ -50,10 +50,10 @@ fn without_tails(mesh: &Mesh, low: Vec3, high: Vec3) -> Option<(Vec3, Vec3)> {
             .map(|corners| corners.iter().map(|&i| mesh.positions[i as usize][axis]).sum::<f32>() / 3.0)
             .collect();
         middles.sort_by(f32::total_cmp);
-        (ends[0][axis], ends[1][axis]) = (middles[tail], middles[middles.len() - 1 - tail]);
+        (first[axis], last[axis]) = (middles[tail], middles[middles.len() - 1 - tail]);
     }
-    let margin = (ends[1] - ends[0]) * 0.1;
-    let (near_low, near_high) = ((ends[0] - margin).max(low), (ends[1] + margin).min(high));
+    let margin = (last - first) * 0.1;
+    let (near_low, near_high) = ((first - margin).max(low), (last + margin).min(high));
     ((near_high - near_low).max_element() < FAR_BOX * (high - low).max_element()).then_some((near_low, near_high))
 }
 

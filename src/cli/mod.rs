@@ -1,6 +1,7 @@
 //! The command line: what was typed. `commands/` turns it into what it means.
 
 mod export;
+mod look;
 mod trace;
 mod values;
 
@@ -12,6 +13,7 @@ use clap::{Args, Parser, Subcommand};
 use crate::probe::lattice::grid::MAX_PROBES;
 
 pub use self::export::{EngineName, ExportArgs, TargetName, VolumesName};
+pub use self::look::LookArgs;
 pub use self::trace::TraceArgs;
 pub use self::values::{LookAt, PictureSize};
 use self::values::{parse_exposure, parse_positive, parse_size, parse_target_error};
@@ -85,6 +87,14 @@ pub enum Command {
     /// three and Bevy blend probes by distance alone, so that light comes through walls between probes. --fit chooses the values
     /// by which that is right as far as can be, --volumes auto keeps rooms apart; `render --as` says how right.
     Export(ExportArgs),
+    /// Write a page to look at a bake: one HTML file that any browser with WebGL 2 opens, without a network.
+    ///
+    /// It shows the scene, lit by the probes with visibility off, on and exact, what leaks, the probes in their own light, and
+    /// of any point its eight probes, their weights and which of them are hidden. Surfaces ask the probes in the browser; exact
+    /// visibility is traced here, at texels of about a 64th of the spacing, or larger where the scene has more than 262,144.
+    ///
+    /// Of more than 524,288 triangles the largest are shown. Normal maps and gloss are not.
+    View(LookArgs),
     /// Print what a probe file holds, and check its hashes.
     Inspect(InspectArgs),
 }

@@ -126,7 +126,7 @@ fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {
             });
             format!("{difference} ÷ its mean, {} W·m⁻²{noise}", format::significant(mean, 4))
         }
-        None => format!("{difference}, which is black"),
+        None => format!("{difference}, which is black: no light reaches what this camera sees"),
     }];
     let regions: [(&str, Part); 2] = [("in corners", |e| &e.by_region.corner), ("elsewhere", |e| &e.by_region.flat)];
     for (name, region) in regions {

@@ -12,8 +12,11 @@ points from standard input, one a line; three more numbers on a line are the geo
 import json
 import sys
 
-import numpy as np
-from safetensors import safe_open
+try:
+    import numpy as np
+    from safetensors import safe_open
+except ModuleNotFoundError as missing:
+    sys.exit(f"error: the Python package {missing.name} is not installed: python3 -m pip install numpy safetensors")
 
 
 def small_float(code, mantissa_bits):

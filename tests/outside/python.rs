@@ -59,7 +59,7 @@ fn points(scene: &Scene, count: u32) -> Vec<Asked> {
 /// Harmonics with gradients.
 const FITTED: &str = "--set grid.spacing_m=2 --set fit=rows(rows_per_probe:20,paths:4)";
 
-/// `scripts/readme/read_probes.py`, which is README's description of the look-up as a program, and the tool's own look-up:
+/// `scripts/readme/read_probes.py`, which is the look-up of src/probe/README.md as a program, and the tool's own look-up:
 /// the same at 10,000 points.
 pub fn the_script_of_the_readme_asks_as_the_tool_does() {
     let cases = [

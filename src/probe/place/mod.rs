@@ -4,7 +4,8 @@
 
 pub mod air;
 mod ddgi;
-pub mod need;
+pub mod lend;
+mod need;
 pub mod overlap;
 mod piece;
 mod placement;

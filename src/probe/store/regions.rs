@@ -22,7 +22,7 @@ use glam::{UVec3, Vec3};
 use rayon::prelude::*;
 use safetensors::Dtype;
 
-pub use self::grow::air_places;
+pub use self::grow::{Rank, air_places};
 use self::words::{AXIS_SHIFT, FAR, LEAF, LOW, NUMBER, Part, THRESHOLD_SHIFT, distance, length, number};
 use super::surface::{Facing, MAX_VOXELS_PER_CELL, Seen, SurfaceVisibility, voxel_of};
 use crate::probe::container::Container;
@@ -37,14 +37,13 @@ pub struct Regions {
 }
 
 impl Regions {
-    /// The trees of a table. Entries answer as they do there, but for those that see nothing and are `buried` inside of solids:
-    /// nothing asks these. The air answers about as `air` says: what the [`air_places`] of each cell see, or nothing where that
-    /// is not known.
-    pub fn new(grid: &Grid, table: &SurfaceVisibility, buried: &[bool], air: &[Vec<u8>]) -> Regions {
+    /// The trees of a table. Entries answer as they do there, according to their `ranks`. The air answers about as `air` says: what
+    /// the [`air_places`] of each cell see, or nothing where that is not known.
+    pub fn new(grid: &Grid, table: &SurfaceVisibility, ranks: &[Rank], air: &[Vec<u8>]) -> Regions {
         let air = |cell: u32| air.get(cell as usize).map_or(&[][..], Vec::as_slice);
         let trees: Vec<Vec<u16>> = (0..grid.cell_count() as u32)
             .into_par_iter()
-            .map_init(grow::Grower::default, |grower, cell| grower.tree(table, CellIndex(cell), buried, air(cell)))
+            .map_init(grow::Grower::default, |grower, cell| grower.tree(table, CellIndex(cell), ranks, air(cell)))
             .collect();
         let (mut roots, mut words) = (Vec::with_capacity(trees.len()), Vec::new());
         let mut known: HashMap<Vec<u16>, u32> = HashMap::new();

@@ -14,6 +14,17 @@ const NOTHING: Answer = 256;
 /// Only a probe farther away is seen: this plus its number.
 const FARTHER: Answer = 257;
 
+/// How much an entry's answer counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rank {
+    /// It is what the surface sees, and has to stay exact.
+    Own,
+    /// It is what others see, and may be as wrong as the air.
+    Lent,
+    /// No one asks there.
+    Buried,
+}
+
 /// A place that a tree answers.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
@@ -58,8 +69,8 @@ pub struct Grower {
 }
 
 impl Grower {
-    /// A cell's tree. `air` is what each of its [`air_places`] sees, or empty.
-    pub fn tree(&mut self, table: &SurfaceVisibility, cell: CellIndex, buried: &[bool], air: &[u8]) -> Vec<u16> {
+    /// A cell's tree. `ranks` are those of all entries; `air` is what each of the cell's [`air_places`] sees, or empty.
+    pub fn tree(&mut self, table: &SurfaceVisibility, cell: CellIndex, ranks: &[Rank], air: &[u8]) -> Vec<u16> {
         let mut words = Vec::new();
         if table.range(cell).is_empty() {
             // Where no surface is known everything is seen.
@@ -72,11 +83,12 @@ impl Grower {
         self.is_known.resize(n.pow(3) as usize * 6, false);
         for entry in table.entries(cell) {
             let (facing, answer) = (Facing::of(entry.facing), answer(table, &entry));
-            if answer == NOTHING && buried[entry.index] {
+            let rank = ranks[entry.index];
+            if rank == Rank::Buried {
                 continue;
             }
             self.is_known[Self::place(n, entry.voxel, facing)] = true;
-            self.add(entry.voxel, facing, answer, true);
+            self.add(entry.voxel, facing, answer, rank == Rank::Own);
         }
         // Who sees none of the eight is inside of something, or cannot be helped.
         for (place, &mask) in air_places(n).zip(air).filter(|(_, mask)| **mask != 0) {

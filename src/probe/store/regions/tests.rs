@@ -33,9 +33,9 @@ fn table(n: u32, share: f32, masks: &[u8], seed: u64) -> SurfaceVisibility {
     table
 }
 
-/// None of whose entries is inside of a solid.
-fn open(table: &SurfaceVisibility) -> Vec<bool> {
-    vec![false; table.keys.len()]
+/// All entries are as exact as what surfaces see.
+fn open(table: &SurfaceVisibility) -> Vec<Rank> {
+    vec![Rank::Own; table.keys.len()]
 }
 
 fn whole(table: &SurfaceVisibility) -> Regions {
@@ -127,7 +127,8 @@ fn the_air_answers_as_it_sees_up_to_the_surfaces() {
     assert_eq!(ask([4.1 / 8.0, 0.5 / 8.0, 3.5 / 8.0], Vec3::Y), 0x33);
     assert_eq!(ask([3.5 / 8.0, 1.1 / 8.0, 3.5 / 8.0], Vec3::Y), 0x33);
     // Inside of a solid it is none at all.
-    let buried: Vec<bool> = table.masks.iter().map(|mask| *mask == 0).collect();
+    let rank = |mask: &u8| if *mask == 0 { Rank::Buried } else { Rank::Own };
+    let buried: Vec<Rank> = table.masks.iter().map(rank).collect();
     let air = air_places(n).map(seen).collect();
     let without = Regions::new(&grid, &table, &buried, &[air]);
     let at = Vec3::new(3.5, 0.5, 3.5) / 8.0;

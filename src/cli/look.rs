@@ -20,7 +20,7 @@ pub struct LookArgs {
     /// Page to write.
     #[arg(short, long, value_name = "FILE.html")]
     pub output: PathBuf,
-    /// Exposure at first, in powers of two; from the surfaces where not given.
+    /// Exposure at first, in powers of two; from what the first camera sees where not given.
     #[arg(long, value_name = "EV", allow_hyphen_values = true, value_parser = parse_exposure)]
     pub exposure: Option<f32>,
     /// Show the probes on the scene although it has changed since the bake.

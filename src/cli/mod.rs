@@ -91,7 +91,7 @@ pub enum Command {
     ///
     /// It shows the scene, lit by the probes with visibility off, on and exact, what leaks, the probes in their own light, and
     /// of any point its eight probes, their weights and which of them are hidden. Surfaces ask the probes in the browser; exact
-    /// visibility is traced here, at texels of about a 64th of the spacing, or larger where the scene has more than 262,144.
+    /// visibility is traced here, at texels of about a 64th of the spacing, or larger where the scene has more than 1,048,576.
     ///
     /// Of more than 524,288 triangles the largest are shown. Normal maps and gloss are not.
     View(LookArgs),

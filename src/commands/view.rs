@@ -12,14 +12,15 @@ use super::{Console, tell};
 use crate::cli::LookArgs;
 use crate::image::Picture;
 use crate::light::World;
-use crate::light::lambert::reflected_radiance;
 use crate::probe::file::{self, ProbeFile};
 use crate::probe::lattice::ProbeState;
-use crate::probe::query::Query;
+use crate::probe::query::{Query, Visibility};
 use crate::report::page::look::{self, Figures, Look, MOST_TRIANGLES, Shown, leaks};
 use crate::scene::{Camera, Detail};
 use crate::shade::framing::frame;
-use crate::shade::texels::{self, Charts, Texel};
+use crate::shade::layers::beauty;
+use crate::shade::points::see;
+use crate::shade::texels::{self, Charts};
 use crate::system::format;
 use crate::system::output::{Named, write_atomically};
 
@@ -42,7 +43,8 @@ pub fn run(args: &LookArgs, console: &Console) -> Result<()> {
     let texels = texels::light(&world, &query, &charts, session.seed);
     let texels_s = started.elapsed().as_secs_f64();
     let leaks = leaks(&texels);
-    let exposure_ev = args.exposure.unwrap_or_else(|| exposure(&texels));
+    let cameras = cameras(&world);
+    let exposure_ev = args.exposure.unwrap_or_else(|| exposure(&world, &query, &cameras[0], session.seed));
     let mut notes = Vec::new();
     if shown.left_out > 0 {
         notes.push(format!(
@@ -59,7 +61,7 @@ pub fn run(args: &LookArgs, console: &Console) -> Result<()> {
     let html = look::render(Look {
         scene,
         query: &query,
-        cameras: &cameras(&world),
+        cameras: &cameras,
         charts: &charts,
         texels: &texels,
         exposure_ev,
@@ -115,10 +117,14 @@ fn cameras(world: &World) -> Vec<Camera> {
     vec![frame(world, scene.mesh.bounds().unwrap_or((Vec3::NEG_ONE, Vec3::ONE))).0]
 }
 
-/// The exposure that shows what surfaces reflect with exact visibility at mid grey.
-fn exposure(texels: &[Texel]) -> f32 {
-    let shown = |texel: &Texel| texel.own + reflected_radiance(texel.albedo, texel.irradiance[2]);
-    Picture::from_pixels(texels.len() as u32, 1, texels.iter().map(shown).collect()).auto_exposure_ev()
+/// The exposure that shows what a camera sees at mid grey, as pictures of `render` without a reference have it.
+fn exposure(world: &World, query: &Query, camera: &Camera, seed: u64) -> f32 {
+    // As coarse as a mean allows.
+    const SIZE: (u32, u32) = (96, 54);
+    let view = see(world, camera, SIZE.0, SIZE.1, seed);
+    let pixels: Vec<Vec3> =
+        view.points.iter().map(|point| beauty(point, query.irradiance(&point.query, Visibility::Stored))).collect();
+    if pixels.is_empty() { 0.0 } else { Picture::from_pixels(pixels.len() as u32, 1, pixels).auto_exposure_ev() }
 }
 
 /// The page's table.
@@ -137,7 +143,7 @@ fn figures(
     };
     let rows = [
         ("Grid", volume.grid.describe()),
-        ("Spacing", format!("{} m", volume.grid.spacing())),
+        ("Spacing", format!("{} m", volume.grid.spacing().to_array().map(|s| s.to_string()).join(" × "))),
         (
             "Probes",
             format!(
@@ -158,7 +164,7 @@ fn figures(
         ("Texels", format!("{} of {:.1} cm", format::count(charts.count as u64), 100.0 * charts.side_m)),
         ("Leaks over all surfaces, visibility off", leak(&leaks[0])),
         ("Leaks over all surfaces, visibility on", leak(&leaks[1])),
-        ("Scene", format!("BLAKE3 {}", session.scene.blake3)),
+        ("Scene", format!("BLAKE3 {:.16} …", session.scene.blake3)),
     ];
     rows.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
 }

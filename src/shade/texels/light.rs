@@ -59,18 +59,24 @@ fn texel(
     (area_m2, salt): (f32, u32),
 ) -> Texel {
     let front = world.scene.mesh.geometric_normal(chart.triangle);
-    let Place { centre, barycentric } = *place;
-    let hit = Hit { t: 0.0, triangle: chart.triangle, barycentric };
-    let surface = world.surface_at(hit, -front * side);
-    let geometric = surface.geometric_normal;
-    let point = asker(surface.position, surface.shading_normal, geometric);
+    let Place { centre, barycentrics } = *place;
     let grid = &query.volume.grid;
+    let geometric = front * side;
     let cell = query.cell(&asker(centre + geometric * NUDGE * grid.spacing_min(), geometric, geometric));
-    let mask_of = |corners| exact_mask(world, query, contacts, &surface, corners, salt);
-    let mask = mask_of(grid.corners_around(&cell));
+    let corners = grid.corners_around(&cell);
+    let surface_at = |barycentric| {
+        let surface = world.surface_at(Hit { t: 0.0, triangle: chart.triangle, barycentric }, -geometric);
+        (exact_mask(world, query, contacts, &surface, corners, salt), surface)
+    };
+    let centred = surface_at(barycentrics[0]);
+    // Where the centre sees nothing, another place of the texel may be the one that is seen.
+    let others = || barycentrics[1..].iter().map(|&place| surface_at(place)).find(|(mask, _)| *mask != 0);
+    let (mask, surface) = if centred.0 != 0 { centred } else { others().unwrap_or(centred) };
+    let point = asker(surface.position, surface.shading_normal, geometric);
     // The place and the centre may lie on two sides of a plane of the grid.
     let own_corners = grid.corners_around(&query.cell(&point));
-    let own_mask = if own_corners == grid.corners_around(&cell) { mask } else { mask_of(own_corners) };
+    let is_same = own_corners == corners;
+    let own_mask = if is_same { mask } else { exact_mask(world, query, contacts, &surface, own_corners, salt) };
     let modes = [Visibility::Off, Visibility::Stored, Visibility::Exact(own_mask)];
     let (direct, _) = world.punctual_irradiance(&surface, surface.shading_normal, salt);
     Texel {

@@ -14,7 +14,7 @@ use crate::probe::Grid;
 use crate::scene::{Scene, TriangleIndex};
 
 /// Most texels besides one for every side of a triangle.
-pub const MOST: usize = 1 << 18;
+pub const MOST: usize = 1 << 20;
 
 /// Texels a spacing at the finest, times a factor that no length of a scene is a multiple of: what lies at a whole number of
 /// texels is then no plane of cells or voxels by design.
@@ -58,9 +58,14 @@ pub struct Charts {
 pub struct Place {
     /// Centre in the triangle's plane; may lie outside of the triangle.
     pub centre: Vec3,
-    /// Weights of the triangle's second and third vertex at the nearest place on it.
-    pub barycentric: Vec2,
+    /// Weights of the triangle's second and third vertex at the place on it that is nearest to the centre, and to places around
+    /// it, for texels whose centre lies inside of another solid.
+    pub barycentrics: [Vec2; 5],
 }
+
+/// Places around a texel's centre, in texels.
+const AROUND: [DVec2; 5] =
+    [DVec2::ZERO, DVec2::new(0.4, 0.4), DVec2::new(-0.4, 0.4), DVec2::new(0.4, -0.4), DVec2::new(-0.4, -0.4)];
 
 impl Charts {
     /// Texels for these triangles, as fine as [`MOST`] allows.
@@ -110,7 +115,8 @@ impl Charts {
             let [u, v] = others(axis);
             (centre[u], centre[v]) = (at.x, at.y);
             centre[axis] = (level - normal.dot(centre)) / normal[axis];
-            Place { centre: centre.as_vec3(), barycentric: nearest(flat, at, INWARDS * side) }
+            let barycentrics = AROUND.map(|way| nearest(flat, at + way * side, INWARDS * side));
+            Place { centre: centre.as_vec3(), barycentrics }
         };
         (0..width * chart.height).map(place)
     }

@@ -259,7 +259,7 @@ const look = (() => {
   const oversee = () => {
     const middle = vector.times(vector.add(low, high), 0.5), radius = 0.5 * vector.length(vector.minus(high, low));
     const way = vector.unit([-0.45, -0.75, -0.55]);
-    camera.stand(vector.minus(middle, vector.times(way, 2.1 * radius)), way, 2.1 * radius, 0.9);
+    camera.stand(vector.minus(middle, vector.times(way, 2.5 * radius)), way, 2.5 * radius, 0.9);
     cutAt(0.6);
     move();
   };
@@ -352,7 +352,7 @@ const look = (() => {
     camera.near(Math.exp(Math.max(-0.6, Math.min(0.6, event.deltaY * (event.deltaMode ? 0.05 : 0.0015)))));
     move();
   }, { passive: false });
-  new ResizeObserver(() => move()).observe(canvas);
+  new ResizeObserver(change).observe(canvas);
   canvas.addEventListener('webglcontextlost', () => {
     held = null;
     stage.dataset.state = 'lost';

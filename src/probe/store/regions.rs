@@ -109,6 +109,11 @@ impl Regions {
         (self.words[leaf] & FAR != 0).then(|| ProbeIndex(number(&self.words[leaf + 1..])))
     }
 
+    /// Roots and words, as the file has them.
+    pub fn numbers(&self) -> (&[u32], &[u16]) {
+        (&self.roots, &self.words)
+    }
+
     /// Parts that all cells are divided into, shared ones once.
     pub fn parts(&self) -> usize {
         let mut parts = 0;

@@ -2,6 +2,7 @@
 
 mod export;
 mod inspect;
+mod look;
 pub mod topics;
 mod trace;
 mod values;
@@ -15,6 +16,7 @@ use crate::probe::lattice::grid::MAX_PROBES;
 
 pub use self::export::{EngineName, ExportArgs, TargetName, VolumesName};
 pub use self::inspect::{HelpArgs, InspectArgs};
+pub use self::look::LookArgs;
 pub use self::trace::TraceArgs;
 pub use self::values::{LookAt, PictureSize};
 use self::values::{parse_exposure, parse_index, parse_positive, parse_size, parse_target_error};
@@ -89,6 +91,14 @@ pub enum Command {
     /// three and Bevy blend probes by distance alone, so that light comes through walls between probes. --fit chooses the values
     /// by which that is right as far as can be, --volumes auto keeps rooms apart; `render --as` says how right.
     Export(ExportArgs),
+    /// Write a page to look at a bake: one HTML file that any browser with WebGL 2 opens, without a network.
+    ///
+    /// It shows the scene, lit by the probes with visibility off, on and exact, what leaks, the probes in their own light, and
+    /// of any point its eight probes, their weights and which of them are hidden. Surfaces ask the probes in the browser; exact
+    /// visibility is traced here, at texels of about a 64th of the spacing, or larger where the scene has more than 1,048,576.
+    ///
+    /// Of more than 524,288 triangles the largest are shown. Normal maps and gloss are not.
+    View(LookArgs),
     /// Print what a probe file holds, and check its hashes.
     Inspect(InspectArgs),
     /// Explain a command or a topic; without a name list both.

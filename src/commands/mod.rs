@@ -15,6 +15,7 @@ mod session;
 pub mod sweep;
 mod target;
 mod tell;
+pub mod view;
 
 use std::io::Write;
 use std::path::Path;
@@ -99,6 +100,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::DiffReport(args) => return diff_report::run(&args, &console),
         Command::Convert(args) => convert::run(&args, &console)?,
         Command::Export(args) => export::run(&args, &console)?,
+        Command::View(args) => view::run(&args, &console)?,
         Command::Inspect(args) => inspect::run(&args, &console)?,
         Command::Help(args) => help::run(&args, &console)?,
     }

@@ -7,11 +7,11 @@ pub mod film;
 pub mod framing;
 pub mod held_out;
 pub mod layers;
-
 pub mod outlook;
 pub mod points;
 pub mod reference;
 pub mod reference_file;
 pub mod regions;
 pub mod spheres;
+pub mod texels;
 pub mod visibility_modes;

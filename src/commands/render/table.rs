@@ -138,7 +138,7 @@ fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {
     let difference = format!("error: root mean square difference from the reference{transport}");
     let mut lines = vec![match mean.filter(|mean| *mean > 0.0) {
         Some(mean) => format!("{difference} ÷ its mean, {} W·m⁻²", format::significant(mean, 4)),
-        None => format!("{difference}, which is black"),
+        None => format!("{difference}, which is black: no light reaches what this camera sees"),
     }];
     if let (Some(mean), Some(error)) = (mean.filter(|mean| *mean > 0.0), reference.standard_error_mean) {
         lines.push(format!("a pixel of the reference is known to {} on average", format::percent(error / mean)));

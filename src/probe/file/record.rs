@@ -41,9 +41,8 @@ pub struct SceneRecord {
 
 /// Version of the metadata key `query` that this program writes. A change of what a look-up does raises it.
 /// 2 added `light.unassigned`; 3 added to `weights` `weight_normal`, `look_up`, `bias_spacing`, `distance_bias` and
-/// `blank_below`; 4 added visibility as trees, which tests ask without settings,
-/// and `sum_floor`.
-pub const QUERY_VERSION: u32 = 4;
+/// `blank_below`; 4 added visibility as trees, which tests ask without settings, and `sum_floor`; 5 added thin walls to the trees.
+pub const QUERY_VERSION: u32 = 5;
 
 /// The metadata key `query`: all that a look-up and the shading around it need beside the tensors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -12,6 +12,7 @@ mod corner_test;
 mod look_up;
 mod point;
 mod settings;
+mod shader;
 #[cfg(test)]
 mod tests;
 
@@ -19,3 +20,4 @@ pub use self::answers::Answers;
 pub use self::look_up::{Query, trilinear};
 pub use self::point::{CornerWeights, Part, QueryPoint, Visibility};
 pub use self::settings::{BiasSpacing, Blend, DirectionWeight, LookUp, QuerySettings, VisibilityTest, WeightNormal};
+pub use self::shader::{LOOK_UP, Shader};

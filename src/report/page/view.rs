@@ -42,6 +42,7 @@ pub fn environment() -> Result<Environment<'static>, Error> {
     // The names' endings turn escaping on.
     environment.add_template("macros.html", include_str!("../assets/page/macros.html"))?;
     environment.add_template("page.html", include_str!("../assets/page/page.html"))?;
+    environment.add_template("look.html", include_str!("../assets/page/look/look.html"))?;
     Ok(environment)
 }
 
@@ -58,13 +59,11 @@ pub fn view(report: Value, gates: &[Gate], packed: Vec<PackedImage>) -> Value {
     };
     let images = images(packed);
     let worst = worst(gates, &images);
-    // From the low to the high end, RGB bytes.
-    let colors: Vec<u8> = (0..COLORS).flat_map(|i| color_at(i as f64 / (COLORS - 1) as f64)).collect();
     context! {
         gates => gates.iter().map(gate).collect::<Vec<_>>(),
         images,
         worst,
-        colors => STANDARD.encode(colors),
+        colors => colors(),
         codes => context! {
             per_octave => codes::PER_OCTAVE,
             offset => codes::OFFSET,
@@ -83,6 +82,11 @@ fn worst(gates: &[Gate], images: &[Value]) -> usize {
         images.iter().position(is_of)
     };
     gates.iter().find_map(of_gate).unwrap_or(0)
+}
+
+/// The colours of heat maps from the low to the high end: RGB bytes, in base64.
+pub fn colors() -> String {
+    STANDARD.encode((0..COLORS).flat_map(|i| color_at(i as f64 / (COLORS - 1) as f64)).collect::<Vec<u8>>())
 }
 
 /// A threshold as somebody wrote it: without the zeros that make figures as long as each other.

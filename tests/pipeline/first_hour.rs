@@ -19,6 +19,7 @@ fn mistakes_are_told_with_what_was_meant() {
         (&["render", probes, rooms, "-o", output][..], &["render SCENE PROBES", "is a probe file"][..]),
         (&["render", rooms, rooms, "-o", output], &["is a scene", "render SCENE PROBES"]),
         (&["bake", probes, "-o", output], &["is a probe file"]),
+        (&["view", probes, rooms, "-o", output], &["view SCENE PROBES"]),
         (&["inspect", rooms], &["is a scene", "inspect PROBES"]),
         (&["export", rooms, "--to", "three", "-o", output], &["is a scene", "export PROBES"]),
         (&["convert", rooms, probes, "-o", output, "--to", "uniform"], &["is a scene", "convert PROBES SCENE"]),

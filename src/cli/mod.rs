@@ -13,7 +13,7 @@ use crate::probe::lattice::grid::MAX_PROBES;
 
 pub use self::export::{EngineName, ExportArgs, TargetName, VolumesName};
 pub use self::trace::TraceArgs;
-pub use self::values::{LookAt, PictureSize};
+pub use self::values::{LookAt, PictureSize, TraceRay};
 use self::values::{parse_exposure, parse_positive, parse_size, parse_target_error};
 
 /// Bakes light-field probe volumes for global illumination and measures how much they leak, err and cost.
@@ -362,6 +362,12 @@ pub struct InspectArgs {
     /// Also print one probe: position, state, irradiance along the six axes.
     #[arg(long, value_name = "I", allow_negative_numbers = true)]
     pub probe: Option<u32>,
+    /// Draw the way of a ray over the maps of the light fields that it is traced in, world space; with --probe over that one's.
+    #[arg(long, value_name = "ox,oy,oz,dx,dy,dz", allow_hyphen_values = true, requires = "output")]
+    pub trace: Option<TraceRay>,
+    /// Picture of the ray's way to write.
+    #[arg(short, long, value_name = "FILE.png", requires = "trace")]
+    pub output: Option<PathBuf>,
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ pub mod block_mean;
 mod develop;
 pub mod film;
 pub mod framing;
+pub mod glossy;
 pub mod held_out;
 pub mod layers;
 
@@ -14,4 +15,5 @@ pub mod reference;
 pub mod reference_file;
 pub mod regions;
 pub mod spheres;
+pub mod traced;
 pub mod visibility_modes;

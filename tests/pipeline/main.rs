@@ -15,6 +15,7 @@ mod distances;
 mod exporting;
 mod fitting;
 mod furnace;
+mod glossy;
 mod layers;
 mod leaks;
 mod plan;

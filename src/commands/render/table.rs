@@ -52,6 +52,7 @@ pub fn table(report: &RenderReport) -> String {
         format::percent(report.methods.first().map_or(0.0, |m| m.leak.unseen)),
     );
     text.extend(report.methods.iter().map(|method| format!("\n{}", air_line(method))));
+    text.extend(report.methods.iter().filter_map(glossy_line).map(|line| format!("\n{line}")));
     let baked = report.baked.as_ref().filter(|b| b.figures.bias.is_some()).map(baked_line);
     if report.fitted {
         text.push_str(&match report.export {
@@ -158,6 +159,37 @@ fn air_line(method: &MethodReport) -> String {
         percent(air.leak_dark),
         percent(air.black)
     )
+}
+
+/// What a method's gloss costs and how far it is off; `None` where it has none.
+fn glossy_line(method: &MethodReport) -> Option<String> {
+    let glossy = method.glossy.as_ref()?;
+    let error = glossy.error_gltf.as_ref().map_or_else(String::new, |error| {
+        let parts: Vec<String> = glossy
+            .parts
+            .iter()
+            .map(|part| format!("{} {}", part.name.replace('_', " "), relative_rmse(&part.error_gltf.all)))
+            .collect();
+        let parts = if parts.is_empty() { String::new() } else { format!(" ({})", parts.join(", ")) };
+        format!(", error_gltf {}{parts}", relative_rmse(&error.all))
+    });
+    let traced = glossy.traced.map_or_else(String::new, |traced| {
+        format!(
+            ", {} probes and {} map reads a ray, {} of the rays lost",
+            format::significant(traced.probes, 3),
+            format::significant(traced.reads, 3),
+            format::percent(traced.lost)
+        )
+    });
+    Some(format!(
+        "{} glossy: {} in {}, {} a probe{traced}{error}",
+        label(method),
+        glossy
+            .radiance_mean
+            .map_or(format::UNDEFINED.to_owned(), |l| format!("{} W·m⁻²·sr⁻¹", format::significant(l, 4))),
+        format::seconds(glossy.shade_ms.median / 1e3),
+        format::bytes(glossy.bytes_per_probe.round() as u64),
+    ))
 }
 
 /// What is wrong with the probes themselves.

@@ -79,6 +79,17 @@ impl GridSettings {
         Ok(self.layout(scene, 1)?.spacing.max_element())
     }
 
+    /// The box that the probes are to cover, without padding, world space, metres.
+    pub fn bounds_in(&self, scene: &Scene) -> (DVec3, DVec3) {
+        match self.bounds {
+            Some(bounds) => (DVec3::from(bounds.min), DVec3::from(bounds.max)),
+            None => {
+                let (low, high) = scene_bounds(scene);
+                (low + scene.origin_world, high + scene.origin_world)
+            }
+        }
+    }
+
     /// The points that these settings ask for, `whole` or a multiple of it along each axis.
     pub(super) fn layout(&self, scene: &Scene, whole: u32) -> Result<Layout, GridError> {
         if self.spacing_m.is_some() && self.divisions.is_some() {

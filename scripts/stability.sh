@@ -10,8 +10,8 @@ Sets up, builds, runs tests/stability.rs and prints a row for every case: what i
 its bound. Writes the rows to FILE.json (out/stability.json where not given), and the table of the methods to
 stability/methods.md beside it.
 
-  --readme  also remakes the README's shortened table and tests/stability/README.md
-  --check   also fails when the README's table lacks a case, has one too many or names another bound; figures may differ
+  --readme  also remakes the shortened table of tests/README.md, and tests/stability/README.md
+  --check   also fails when the table of tests/README.md lacks a case, has one too many or names another bound; figures may differ
 
 Exits 0 when all cases hold, 1 when one does not."
 

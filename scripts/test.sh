@@ -6,8 +6,8 @@ source "$(dirname -- "${BASH_SOURCE[0]}")/lib.sh"
 
 only_help "usage: scripts/test.sh
 
-Sets up (scripts/setup.sh), then runs cargo fmt --check, cargo clippy and cargo test, and compares the README's table of
-stability with the run. Exits 0 when all pass.
+Sets up (scripts/setup.sh), then runs cargo fmt --check, cargo clippy and cargo test, and compares the table of
+stability in tests/README.md with the run. Exits 0 when all pass.
 Some tests need a browser, the Python packages safetensors and numpy, or the shared scenes (LIGHTPROBE_SHARED, or
 ../shared). Run by root where there is apt, it installs chromium if no browser is there; CHROME names one. The packages
 it puts in .deps/python. Tests whose need is not met are ignored, and the last line says how many and why; with CI=true

@@ -7,13 +7,13 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
 
-use glam::{Vec2, Vec3};
+use glam::{UVec3, Vec2, Vec3};
 use lightprobe::light::World;
 use lightprobe::math::octahedral::{oct_from_direction, texel_direction};
 use lightprobe::math::random::{Numbers, Purpose, Random};
 use lightprobe::math::sampling::{cosine_hemisphere, uniform_sphere};
 use lightprobe::probe::Volume;
-use lightprobe::probe::lattice::grid::GridSettings;
+use lightprobe::probe::lattice::grid::{Bounds, GridSettings};
 use lightprobe::probe::lattice::{Grid, ProbeState};
 use lightprobe::probe::query::march::{Reads, TraceSettings};
 use lightprobe::probe::query::trace::{End, Order, Tracing};
@@ -38,9 +38,14 @@ fn load(path: &Path) -> Scene {
     scene::load(path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Probes with nothing but what rays march through.
+/// Probes with nothing but what rays march through, in the middles of so many equal parts of the scene's box: at its corners,
+/// where grids that cover it begin, they would stand within or behind its walls.
 fn volume(world: &World, divisions: (u32, u32, u32), side: usize) -> Volume {
-    let settings = GridSettings { divisions: Some(divisions), ..Default::default() };
+    let (low, high) = world.scene.mesh.bounds().expect("a scene with surfaces");
+    let half = 0.5 * (high - low) / UVec3::from(divisions).as_vec3();
+    let world_space = |corner: Vec3| (world.scene.origin_world + corner.as_dvec3()).into();
+    let bounds = Some(Bounds { min: world_space(low + half), max: world_space(high - half) });
+    let settings = GridSettings { bounds, divisions: Some(divisions), ..Default::default() };
     let grid = Grid::new(&settings, world.scene).unwrap();
     let positions: Vec<Vec3> = grid.probes().map(|p| grid.grid_point(p)).collect();
     let texel = |position: Vec3, o: usize| {
@@ -85,7 +90,7 @@ fn volume(world: &World, divisions: (u32, u32, u32), side: usize) -> Volume {
 /// Rays from surfaces, cosine-distributed, as shading sends them; `clearance` off the surfaces. Surfaces are those that random
 /// rays from free places within the grid meet first.
 fn rays(world: &World, grid: &Grid, clearance: f32) -> Vec<(Vec3, Vec3)> {
-    let (low, high) = grid.hull(0.0);
+    let (low, high) = world.scene.mesh.bounds().unwrap_or(grid.hull(0.0));
     let ray = |i: u64| {
         let mut random = Random::new(11, Purpose::GlossyRays, i, 0);
         let place = Vec3::new(random.uniform(), random.uniform(), random.uniform());
@@ -186,7 +191,9 @@ fn row(file: &str, divisions: (u32, u32, u32), side: usize) -> Figures {
     let world = World::new(&scene, 1.0, 0.999).unwrap();
     let volume = volume(&world, divisions, side);
     let tracing = Tracing::new(&volume, &TraceSettings::default()).unwrap();
-    let rays = rays(&world, &volume.grid, tracing.clearance());
+    let clearance = std::env::var("LIGHTPROBE_CLEARANCE").ok().and_then(|c| c.parse().ok());
+    let clearance = clearance.map_or(tracing.clearance(), |share: f32| share * volume.grid.spacing_max());
+    let rays = rays(&world, &volume.grid, clearance);
     let figures = measure(&world, &volume, &rays);
     let name = Path::new(file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let (x, y, z) = divisions;

@@ -49,7 +49,7 @@ def show(scenes):
 
 
 def sections(scenes):
-    picture = "\n\n![](scripts/readme/methods.png)" if (HERE / "methods.png").is_file() else ""
+    picture = "\n\n![](../../scripts/readme/methods.png)" if (HERE / "methods.png").is_file() else ""
     return [
         ("short", short_table(scenes) + picture),
         ("positions", full_tables("positions", scenes)),
@@ -82,8 +82,7 @@ def publish():
         else:
             print(f"{source.relative_to(ROOT)} is not there: {target.name} stays as it is", file=sys.stderr)
     for name, text in sections(list(SCENES)):
-        path = ROOT / "README.md" if name == "short" else ROOT / "configs" / "presets" / "README.md"
-        put(path, name, text)
+        put(ROOT / "configs" / "presets" / "README.md", name, text)
 
 
 def known(scene):

@@ -19,8 +19,8 @@ Sets up, builds, and sweeps all presets over each scene, in these parts:
 Results lie in out/methods/SCENE/PART. A sweep that was interrupted goes on where it stopped; scenes do not depend on
 each other and may run at the same time. The tables of what there is are printed as Markdown.
 
-  --tables   runs nothing: puts the tables of what lies in out/methods between the markers of README.md and
-             configs/presets/README.md, and the pictures into scripts/readme/
+  --tables   runs nothing: puts the tables of what lies in out/methods between the markers of configs/presets/README.md, and
+             the pictures into scripts/readme/
 
 LIGHTPROBE names a binary to use instead of building one, SCENES and PARTS lists of these, SHARED the folder that holds
 scenes/veach_ajar and scenes/bathroom (../shared), THREADS the threads of each sweep, SIZE and SPP other pictures,

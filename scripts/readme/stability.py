@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Prints the table of a stability run, ends with one line, and exits 1 when a case does not hold.
 
---readme writes the shortened table between the README's markers, and the table of the methods to tests/stability;
+--readme writes the shortened table between the markers of tests/README.md, that of the methods to tests/stability;
 --check compares the former, digits of figures apart. The table of the methods is always written beside the run's JSON.
 """
 import json
@@ -10,7 +10,7 @@ import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-README = ROOT / "README.md"
+README = ROOT / "tests" / "README.md"
 METHODS = ROOT / "tests" / "stability" / "README.md"
 BEGIN, END = "<!-- stability: begin -->", "<!-- stability: end -->"
 
@@ -117,13 +117,13 @@ def main(path, option=None):
     before, _, rest = text.partition(BEGIN)
     block, _, after = rest.partition(END)
     if option and not after:
-        sys.exit(f"error: {README.name} has no {BEGIN} … {END}")
+        sys.exit(f"error: {README} has no {BEGIN} … {END}")
     table = shortened(cases)
     if option == "--readme":
         METHODS.write_text(methods, encoding="utf-8")
         README.write_text(before + BEGIN + "\n" + "\n".join(table) + "\n" + END + after, encoding="utf-8")
     if option == "--check" and without_figures(block.strip().splitlines()) != without_figures(table):
-        print("README.md: its table of stability is not that of this run; run scripts/stability.sh --readme")
+        print("tests/README.md: its table of stability is not that of this run; run scripts/stability.sh --readme")
         failed = True
     print(f"stability: {holding} of {len(cases)} cases hold")
     return failed

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Remakes the README's plot: error against bake time in two open rooms, along a few ladders.
+# Remakes the plot of src/sweep/README.md: error against bake time in two open rooms, along a few ladders.
 
 # shellcheck source=scripts/lib.sh
 source "$(dirname -- "${BASH_SOURCE[0]}")/../lib.sh"

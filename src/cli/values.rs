@@ -96,6 +96,19 @@ pub fn parse_target_error(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "write a share from 1e-6 to 1, such as 0.1 for 10 %".into())
 }
 
+pub fn parse_index(text: &str) -> Result<u32, String> {
+    text.parse().map_err(|_| format!("write a whole number from 0 to {}, such as 8", u32::MAX))
+}
+
+pub fn parse_seed(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| format!("write a whole number from 0 to {}, such as 1", u64::MAX))
+}
+
+/// Numbers that are too large are refused later, with what makes sense.
+pub fn parse_threads(text: &str) -> Result<usize, String> {
+    text.parse().map_err(|_| "write a whole number, such as 2; 0 means one thread per core".into())
+}
+
 pub fn parse_finite(text: &str) -> Result<f64, String> {
     let number: Option<f64> = text.parse().ok().filter(|x: &f64| x.is_finite());
     number.ok_or_else(|| "write a finite number".into())

@@ -7,7 +7,7 @@ use anyhow::{Result, bail, ensure};
 use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
 
-use super::{Console, tell};
+use super::{Console, kinds, tell};
 use crate::cli::{InspectArgs, TraceRay};
 use crate::plan::stage_in_words;
 use crate::probe::file::published::threev8_bytes;
@@ -28,6 +28,7 @@ use crate::system::output::{Named, check_outputs};
 const DIGITS: usize = 6;
 
 pub fn run(args: &InspectArgs, console: &Console) -> Result<()> {
+    kinds::expect_probes(&args.probes, "inspect PROBES")?;
     let started = Instant::now();
     let file = file::read(&args.probes)?;
     tell::probes(console, &args.probes, &file);

@@ -22,6 +22,7 @@ pub mod reference_layers;
 pub mod render;
 pub mod sheet;
 pub mod sweep;
+pub mod sweep_page;
 pub mod table;
 pub mod target;
 pub mod ticks;

@@ -13,6 +13,7 @@ mod decoding;
 mod determinism;
 mod distances;
 mod exporting;
+mod first_hour;
 mod fitting;
 mod furnace;
 mod glossy;

@@ -75,7 +75,7 @@ pub fn cases() -> Vec<Case> {
         let of = seam.clone();
         let checked = "floor lit from the other room, voxels wide";
         cases.push(Case::new("wall", &name, checked, Bound::AtMost(1.0), move || of.voxels));
-        // A known limit, see the README's: walls thinner than a voxel leave such a seam, which lights the dark room a little.
+        // A known limit, see src/probe/README.md: walls thinner than a voxel leave such a seam, which lights the dark room a little.
         cases.push(Case::new("wall", &name, "dark room ÷ lit room, for that seam", Bound::AtMost(1e-2), move || {
             seam.through
         }));

@@ -2,6 +2,7 @@
 
 mod methods;
 mod outputs;
+mod page;
 mod reference;
 mod sheet;
 mod summary;
@@ -28,9 +29,9 @@ use crate::shade::reference::ReferenceSettings;
 use crate::shade::regions::regions;
 use crate::sweep::ladder::LadderFile;
 use crate::sweep::run::{Setting, Truths};
-use crate::sweep::store::Store;
-use crate::system::format;
+use crate::sweep::store::{self, Store};
 use crate::system::output::{Named, check_folder, create_folder};
+use crate::system::{format, interrupt};
 
 /// Memory that evaluation takes at its peak, per pixel: as a render's with a reference, and the sums over the seeds.
 const PIXEL_BYTES: f64 = 1500.0;
@@ -98,12 +99,14 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
         // Times depend on the threads.
         identity: format!("{}spp = {}\nthreads = {}\n", reference.identity.to_text(), reference.spp, session.threads),
     };
+    interrupt::leaves(args.output.join(store::FOLDER), "the same command goes on from there", true);
     let wants_floors = wants_floors(args, file.as_ref());
     let mut work = Work::new(&setting, &ladders, args, wants_floors, console);
     let outcomes = work.run_all()?;
     let sets = summary::ladders(&ladders, &outcomes);
     let floor = if wants_floors { work.floors(&sets, &outcomes)? } else { Vec::new() };
     let shown = work.shown(&sets, &outcomes)?;
+    let irradiance = work.irradiance(&outcomes)?;
     work.bar.finish_and_clear();
 
     let report = summary::report(summary::Parts {
@@ -127,6 +130,8 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
     outputs::write(&report, &args.output)?;
     let contact = sheet::draw(&report, &setting.scenery, &reference.layers, &regions, &shown);
     contact.write_png(&args.output.join(sheet::FILE))?;
+    let seen = page::Seen { scenery: &setting.scenery, reference: &reference.layers, regions: &regions, exposure_ev };
+    page::write(&report, &seen, &irradiance, &args.output)?;
     outputs.iter().filter(|o| o.path.exists()).for_each(|output| tell::written(console, &output.path));
     let kept = format::counted(work.kept as u64, "run", "runs");
     let from_before = if work.kept > 0 { format!(", {kept} kept from before") } else { String::new() };

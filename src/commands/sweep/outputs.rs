@@ -15,6 +15,7 @@ pub const FILES: &[&str] = &[
     super::reference::FILE,
     super::reference::GLTF_FILE,
     super::sheet::FILE,
+    super::page::FILE,
     "sweep.json",
     "sweep.csv",
     "error_time.svg",

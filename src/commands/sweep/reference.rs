@@ -65,11 +65,12 @@ pub fn obtain(
             Err(other) => console.warn(format!("{other}; tracing the reference anew")),
         }
     }
+    let is_resumed = previous.is_some();
     let started = Instant::now();
     let mut tracing = Tracing::new(world, camera, size.width, size.height, settings, previous);
     let new = tracing.remaining() > 0;
     if new {
-        trace(&mut tracing, &path, &identity, console)?;
+        trace(&mut tracing, (&path, &identity), ("the same command goes on from there", is_resumed), console)?;
     }
     let reference = tracing.develop();
     tell::not_finite(console, reference.non_finite);

@@ -41,15 +41,14 @@ pub struct SceneRecord {
 
 /// Version of the metadata key `query` that this program writes. A change of what a look-up does raises it.
 /// 2 added `light.unassigned`; 3 added to `weights` `weight_normal`, `look_up`, `bias_spacing`, `distance_bias` and
-/// `blank_below`; 4 added visibility as trees, which tests ask without settings,
-/// and `sum_floor`; 5 added to `weights` `least_weight`, `glossy`
-/// and `diffuse`.
-pub const QUERY_VERSION: u32 = 5;
+/// `blank_below`; 4 added visibility as trees, which tests ask without settings, and `sum_floor`; 5 added thin walls to the trees;
+/// 6 added to `weights` `least_weight`, `glossy` and `diffuse`.
+pub const QUERY_VERSION: u32 = 6;
 
-/// The version of records without what version 5 added, which are written as they always were.
-pub(super) const PLAIN_VERSION: u32 = 4;
+/// The version of records without what version 6 added, which are written as they always were.
+pub(super) const PLAIN_VERSION: u32 = 5;
 
-/// Keys of `weights` that version 5 added.
+/// Keys of `weights` that version 6 added.
 const ADDED: &[&str] = &["least_weight", "glossy", "diffuse"];
 
 /// The metadata key `query`: all that a look-up and the shading around it need beside the tensors.

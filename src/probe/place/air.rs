@@ -51,22 +51,25 @@ pub fn seen(world: &World, grid: &Grid, placement: &Placement, table: &SurfaceVi
         let seen: Vec<u8> = places.iter().map(|&place| mask(place)).collect();
         let mut rays = seen.len() as u64 * u64::from(active.count_ones());
         // A place that sees no probe takes what the nearest sees that it can see itself: things there may peep out at both.
-        let at = |i: usize| low + places[i] * sides;
-        let masks = (0..seen.len()).map(|i| {
-            if seen[i] != 0 {
-                return seen[i];
-            }
-            let mut others: Vec<usize> = (0..seen.len()).filter(|&other| seen[other] != 0).collect();
-            others.sort_by(|&a, &b| at(a).distance_squared(at(i)).total_cmp(&at(b).distance_squared(at(i))));
-            let mut sees = |&&other: &&usize| {
-                rays += 1;
-                !world.tracer.occluded(Ray::segment(at(i), at(other), 0))
-            };
-            others.iter().take(NEAREST).find(&mut sees).map_or(0, |&other| seen[other])
+        let at: Vec<Vec3> = places.iter().map(|place| low + place * sides).collect();
+        let masks = (0..seen.len()).map(|i| match seen[i] {
+            0 => of_nearest(world, &at, &seen, at[i], &mut rays),
+            mask => mask,
         });
         (masks.collect::<Vec<u8>>(), rays)
     };
     let found: Vec<(Vec<u8>, u64)> = (0..grid.cell_count() as u32).into_par_iter().map(of_cell).collect();
     let rays = found.iter().map(|(_, rays)| rays).sum();
     (found.into_iter().map(|(masks, _)| masks).collect(), rays)
+}
+
+/// What the nearest place sees that sees any probe and is seen from a point; 0 without one.
+pub fn of_nearest(world: &World, places: &[Vec3], seen: &[u8], point: Vec3, rays: &mut u64) -> u8 {
+    let mut others: Vec<usize> = (0..seen.len()).filter(|&place| seen[place] != 0).collect();
+    others.sort_by(|&a, &b| places[a].distance_squared(point).total_cmp(&places[b].distance_squared(point)));
+    let mut sees = |&&place: &&usize| {
+        *rays += 1;
+        !world.tracer.occluded(Ray::segment(point, places[place], 0))
+    };
+    others.iter().take(NEAREST).find(&mut sees).map_or(0, |&place| seen[place])
 }

@@ -4,7 +4,8 @@
 
 pub mod air;
 mod ddgi;
-pub mod need;
+pub mod lend;
+mod need;
 pub mod overlap;
 mod piece;
 mod placement;
@@ -15,6 +16,7 @@ mod stage;
 pub mod survey;
 #[cfg(test)]
 mod tests;
+mod walls;
 
 pub use self::ddgi::DdgiSettings;
 pub use self::placement::{Placement, PlacementTask};

@@ -1,9 +1,11 @@
 //! The stage: settle → survey → need.
 
+use super::lend::lend;
 use super::placement::{Placement, PlacementTask};
 use super::settings::PlacementRule;
 use super::settle::{Settler, settle_all};
 use super::survey::Surveyor;
+use super::walls::walls;
 use super::{air, need};
 use crate::light::World;
 use crate::probe::lattice::{Grid, ProbeState};
@@ -29,17 +31,16 @@ pub fn place(world: &World, task: &PlacementTask, surveying: impl FnOnce()) -> P
             placement.rays += found.rays;
         }
     }
-    let mut table = found.table;
     // Only where shading asks this very table does it need a probe for every entry, and does a probe that no surface sees
     // weigh nothing.
     if occlusion.keeps_survey() {
-        table.far = need::far_probes(world, grid, &placement, &table, &settings.survey);
-        leave_unseen(&world.scene.mesh, grid, &mut placement, &table, settings.keep_unsampled);
-        let (seen, rays) = air::seen(world, grid, &placement, &table);
-        placement.rays += rays;
-        placement.regions = Some(Regions::new(grid, &table, &found.buried, &seen));
+        found.table.far = need::far_probes(world, grid, &placement, &found.table, &settings.survey);
+        leave_unseen(&world.scene.mesh, grid, &mut placement, &found.table, settings.keep_unsampled);
+        let (seen, rays) = air::seen(world, grid, &placement, &found.table);
+        placement.rays += rays + lend(world, grid, &mut found, &seen);
+        placement.regions = Some(Regions::new(grid, &found.table, &found.ranks(), &seen, &walls(&surveyor, &found)));
     }
-    placement.survey = Some(table);
+    placement.survey = Some(found.table);
     placement
 }
 

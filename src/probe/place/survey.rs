@@ -14,6 +14,7 @@ use crate::light::World;
 use crate::light::contact::{Facet, sight_line};
 use crate::math::random::{KroneckerSequence, Purpose, Random, unit_from_bits};
 use crate::probe::lattice::grid::{CellIndex, Grid, ProbeIndex, block};
+use crate::probe::store::regions::Rank;
 use crate::probe::store::surface::{Facing, SurfaceVisibility, active_corners, key, voxel_of_key};
 use crate::scene::{Mesh, TriangleIndex};
 use crate::trace::Ray;
@@ -47,20 +48,33 @@ pub struct Survey {
     pub table: SurfaceVisibility,
     /// Per entry: whether the front of a surface, or a surface that has no back, faces there.
     pub fronts: Vec<bool>,
-    /// Per entry: whether it sees no probe and lies inside of a solid, as far as its points tell.
-    pub buried: Vec<bool>,
+    /// Per entry that sees no probe: a point just off it from which light may come; `None` where it lies inside of a solid or in
+    /// a crack, as far as its points tell.
+    pub open: Vec<Option<Vec3>>,
     pub rays: u64,
+}
+
+impl Survey {
+    /// Of each entry.
+    pub fn ranks(&self) -> Vec<Rank> {
+        let rank = |(mask, open): (&u8, &Option<Vec3>)| match (mask, open) {
+            (0, None) => Rank::Buried,
+            (1.., Some(_)) => Rank::Lent,
+            _ => Rank::Own,
+        };
+        self.table.masks.iter().zip(&self.open).map(rank).collect()
+    }
 }
 
 /// A triangle in one voxel. Small, for there are millions and they are sorted.
 #[derive(Debug, Clone, Copy)]
-struct Met {
-    cell: CellIndex,
-    triangle: u32,
+pub struct Met {
+    pub cell: CellIndex,
+    pub triangle: u32,
     /// Of the voxel with [`Facing::ALL`]'s first facing.
-    voxel_key: u16,
+    pub voxel_key: u16,
     /// Of the front.
-    facing: Facing,
+    pub facing: Facing,
 }
 
 impl Met {
@@ -85,8 +99,8 @@ struct Tally {
     rays: u64,
     /// Points that see any probe at all. The others mostly lie inside solids where walls meet, and have no vote.
     points: u32,
-    /// Whether one of the others lies in the open: what it faces is no back.
-    is_open: bool,
+    /// Off one of the others that lies in the open: what it faces is no back, nor so close that no one can be there.
+    open: Option<Vec3>,
     /// How many points see each corner.
     visible: [u32; 8],
 }
@@ -96,9 +110,11 @@ impl Tally {
         self.visible.iter().all(|&v| v == 0 || v == self.points)
     }
 
-    /// Corners that most points see.
+    /// Corners that more than half of the points see, or else those that the most see.
     fn majority(&self) -> u8 {
-        (0..8).fold(0, |mask, i| mask | u8::from(2 * self.visible[i] > self.points) << i)
+        let most = self.visible.into_iter().max().unwrap_or(0);
+        let enough = most.min(self.points / 2 + 1);
+        (0..8).fold(0, |mask, i| mask | u8::from(enough > 0 && self.visible[i] >= enough) << i)
     }
 }
 
@@ -109,7 +125,7 @@ struct Found {
     key: u16,
     mask: u8,
     is_front: bool,
-    is_buried: bool,
+    open: Option<Vec3>,
     /// Whether anything there asks: not the inside of a solid, nor a voxel that an edge merely touches.
     asks: bool,
     rays: u64,
@@ -117,12 +133,13 @@ struct Found {
 
 /// The surfaces in every voxel of a grid.
 pub struct Surveyor<'a, 's> {
-    world: &'a World<'s>,
-    grid: &'a Grid,
-    n: u32,
+    pub world: &'a World<'s>,
+    pub grid: &'a Grid,
+    /// Voxels along each axis of a cell.
+    pub n: u32,
     pub settings: &'a SurveySettings,
     /// By cell, voxel and triangle.
-    met: Vec<Met>,
+    pub met: Vec<Met>,
 }
 
 impl<'a, 's> Surveyor<'a, 's> {
@@ -138,7 +155,7 @@ impl<'a, 's> Surveyor<'a, 's> {
         surveyor
     }
 
-    fn mesh(&self) -> &'a Mesh {
+    pub fn mesh(&self) -> &'a Mesh {
         &self.world.scene.mesh
     }
 
@@ -187,7 +204,7 @@ impl<'a, 's> Surveyor<'a, 's> {
     }
 
     /// A position in units of a cell's voxels.
-    fn in_voxels(&self, cell: CellIndex, position: Vec3) -> Vec3 {
+    pub fn in_voxels(&self, cell: CellIndex, position: Vec3) -> Vec3 {
         self.grid.cell_from_scene(cell, position) * self.n as f32
     }
 
@@ -205,7 +222,7 @@ impl<'a, 's> Surveyor<'a, 's> {
         let found: Vec<Found> =
             groups.into_par_iter().flat_map_iter(|group| looks(self, placement, group).map(|l| l.look())).collect();
         let mut table = SurfaceVisibility { voxels_per_cell: self.n, ..Default::default() };
-        let (mut fronts, mut buried) = (Vec::new(), Vec::new());
+        let (mut fronts, mut open) = (Vec::new(), Vec::new());
         let mut anew = found.iter().filter(|found| found.asks).peekable();
         for cell in self.grid.cells() {
             table.cell_start.push(table.keys.len() as u32);
@@ -214,17 +231,17 @@ impl<'a, 's> Surveyor<'a, 's> {
                 table.keys.extend(&known.table.keys[range.clone()]);
                 table.masks.extend(&known.table.masks[range.clone()]);
                 fronts.extend(&known.fronts[range.clone()]);
-                buried.extend(&known.buried[range]);
+                open.extend(&known.open[range]);
             }
             while let Some(found) = anew.next_if(|found| found.cell == cell) {
                 table.keys.push(found.key);
                 table.masks.push(found.mask);
                 fronts.push(found.is_front);
-                buried.push(found.is_buried);
+                open.push(found.open);
             }
         }
         table.cell_start.push(table.keys.len() as u32);
-        Survey { table, fronts, buried, rays: found.iter().map(|found| found.rays).sum() }
+        Survey { table, fronts, open, rays: found.iter().map(|found| found.rays).sum() }
     }
 }
 
@@ -263,7 +280,7 @@ impl Look<'_, '_> {
         // Backs of surfaces that have only fronts are asked for where nothing else is.
         let is_outside = |side: &Side| !side.is_back || world.scene.material(side.triangle).double_sided;
         let is_front = self.sides.iter().any(is_outside);
-        let mut found = Found { cell, key, mask: 0, is_front, is_buried: false, asks: false, rays: 0 };
+        let mut found = Found { cell, key, mask: 0, is_front, open: None, asks: false, rays: 0 };
         let active = active_corners(grid, &self.placement.states, cell);
         if active == 0 {
             return found;
@@ -290,14 +307,14 @@ impl Look<'_, '_> {
             }
             let tally = self.tally(&pieces, active, search, tier);
             found.rays += tally.rays;
-            found.is_buried |= tier == 0 && !tally.is_open;
+            found.open = if tier == 0 { tally.open } else { found.open };
             if tally.points > 0 {
                 found.mask = tally.majority();
                 break;
             }
         }
         found.asks |= found.mask != 0;
-        found.is_buried &= found.mask == 0;
+        found.open = found.open.filter(|_| found.mask == 0);
         found
     }
 
@@ -334,7 +351,7 @@ impl Look<'_, '_> {
             let is_last_hope = tried >= first && tally.points == 0;
             if is_last_hope {
                 tally.rays += 1;
-                if self.is_buried(&facet, salt) {
+                if self.room(&facet, salt).is_none() {
                     continue;
                 }
             }
@@ -350,9 +367,10 @@ impl Look<'_, '_> {
                 seen |= u8::from(!world.tracer.occluded(Ray::segment(origin, target, salt))) << corner;
             }
             tally.points += u32::from(seen != 0);
-            if seen == 0 && !tally.is_open {
-                tally.rays += u64::from(!is_last_hope);
-                tally.is_open = is_last_hope || !self.is_buried(&facet, salt);
+            if seen == 0 && tally.open.is_none() {
+                tally.rays += 1;
+                let room = self.room(&facet, salt).filter(|room| *room > self.crack());
+                tally.open = room.map(|_| position + normal * self.crack());
             }
             (0..8).for_each(|corner| tally.visible[corner] += u32::from(seen >> corner & 1));
         }
@@ -361,11 +379,21 @@ impl Look<'_, '_> {
 }
 
 impl Look<'_, '_> {
-    /// Whether a point lies inside a solid: what it faces is a back.
-    fn is_buried(&self, facet: &Facet, salt: u32) -> bool {
+    /// How far it is from a point to what it faces, metres. `None` inside of a solid, where that is a back.
+    fn room(&self, facet: &Facet, salt: u32) -> Option<f32> {
         let origin = facet.position + facet.normal * facet.offset;
-        let met = self.surveyor.world.surface(Ray::new(origin, facet.normal, salt));
-        met.is_some_and(|surface| surface.is_back())
+        match self.surveyor.world.surface(Ray::new(origin, facet.normal, salt)) {
+            Some(surface) => (!surface.is_back()).then_some(surface.hit.t),
+            None => Some(f32::INFINITY),
+        }
+    }
+
+    /// Metres: what lies this close before a surface leaves no room for anyone who asks, as between tiles and a wall.
+    fn crack(&self) -> f32 {
+        /// Voxels.
+        const CRACK: f32 = 0.5;
+        let Surveyor { grid, n, .. } = *self.surveyor;
+        CRACK * grid.cell_box(self.cell).1.min_element() / n as f32
     }
 }
 

@@ -12,6 +12,7 @@ use crate::light::World;
 use crate::probe::lattice::grid::{GridSettings, ProbeIndex};
 use crate::probe::lattice::{Grid, ProbeState};
 use crate::probe::store::OcclusionStore;
+use crate::probe::store::regions::Rank;
 use crate::probe::store::surface::SurfaceVisibility;
 use crate::scene::{self, LoadOptions, Scene};
 use crate::trace::Ray;
@@ -153,6 +154,34 @@ fn far_probes_are_seen_and_not_too_far() {
     assert!(met * 10 >= table.far.len() * 9, "{met} of {}", table.far.len());
     // The same every time.
     assert_eq!(far_probes(&world, &grid, &placement, table, &settings.survey), table.far);
+}
+
+/// Surfaces in slits and behind drawers that see no probe get what those see that they see: few are left without an answer,
+/// and what surfaces see themselves stays as it is.
+#[test]
+fn open_surfaces_that_see_no_probe_are_lent_what_others_see() {
+    let scene = scene("office");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let grid = grid(&scene, 1.0);
+    let settings = PlacementSettings::default();
+    let occlusion = OcclusionStore::None;
+    let task = PlacementTask { grid: &grid, settings: &settings, occlusion: &occlusion, reach: 0.0 };
+    let placement = settle_all(&world, &task);
+    let mut survey = Surveyor::new(&world, &grid, 12, &settings.survey).survey(&placement, None);
+    survey.table.far = far_probes(&world, &grid, &placement, &survey.table, &settings.survey);
+    let (seen, _) = air::seen(&world, &grid, &placement, &survey.table);
+    let own = survey.table.masks.clone();
+    let blind = |survey: &super::survey::Survey| {
+        let table = &survey.table;
+        let is_blind = |&i: &usize| table.masks[i] == 0 && survey.open[i].is_some() && table.far_probe(i).is_none();
+        (0..own.len()).filter(is_blind).count()
+    };
+    let before = blind(&survey);
+    super::lend::lend(&world, &grid, &mut survey, &seen);
+    let after = blind(&survey);
+    assert!(before > 1000 && after * 3 < before, "{before} before, {after} after");
+    let ranks = survey.ranks();
+    assert!((0..own.len()).all(|i| own[i] == survey.table.masks[i] || own[i] == 0 && ranks[i] == Rank::Lent));
 }
 
 #[test]

@@ -15,6 +15,7 @@ pub mod march;
 mod point;
 mod prefiltered;
 mod settings;
+mod shader;
 #[cfg(test)]
 mod tests;
 pub mod trace;
@@ -25,3 +26,4 @@ pub use self::look_up::{Query, trilinear};
 pub use self::point::{CornerWeights, Part, QueryPoint, Visibility};
 pub use self::prefiltered::Source;
 pub use self::settings::{BiasSpacing, Blend, DirectionWeight, LookUp, QuerySettings, VisibilityTest, WeightNormal};
+pub use self::shader::{LOOK_UP, Shader};

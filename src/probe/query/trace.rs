@@ -60,8 +60,9 @@ const CORNERS: usize = 8;
 /// Farthest that rays go, in diagonals of the probes' hull: beyond it they have left what probes see between.
 const REACH: f32 = 64.0;
 
-/// See [`Tracing::clearance`]; spacings.
-const CLEARANCE: f32 = 0.01;
+/// See [`Tracing::clearance`]; spacings. In cornell, 4³ probes of 1024² texels, 94.9 % of rays agreed with the scene's at 0.01,
+/// 96.4 % at 0.03 and 98.6 % at 0.05, beyond which rays would begin behind things that stand on surfaces.
+const CLEARANCE: f32 = 0.03;
 
 /// Rays in one volume.
 #[derive(Clone, Copy)]

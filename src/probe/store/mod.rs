@@ -18,6 +18,7 @@ pub mod sh;
 pub mod surface;
 #[cfg(test)]
 mod tests;
+pub mod textures;
 pub mod tiles;
 pub mod volume;
 

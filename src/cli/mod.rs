@@ -20,7 +20,7 @@ pub use self::export::{EngineName, ExportArgs, TargetName, VolumesName};
 pub use self::inspect::{HelpArgs, InspectArgs};
 pub use self::look::LookArgs;
 pub use self::trace::TraceArgs;
-pub use self::values::{LookAt, PictureSize};
+pub use self::values::{LookAt, PictureSize, TraceRay};
 use self::values::{parse_exposure, parse_index, parse_positive, parse_size, parse_target_error};
 
 /// Bakes light-field probe volumes for global illumination and measures how much they leak, err and cost.

@@ -286,12 +286,14 @@ impl Shaded {
         let error = Some(error::measure(layers, irradiance, regions, flips.as_ref()));
         let shown: Vec<bool> = regions.iter().map(Option::is_some).collect();
         let dark_region = leak::dark_region(irradiance, layers, &shown);
+        let black = leak::false_black(irradiance, layers, &shown);
         if with.glossy {
             self.report.error_gltf = error;
         } else {
             self.report.error = error;
         }
         self.report.leak.dark_region = dark_region;
+        self.report.leak.black = black;
     }
 
     /// Adds the error of the gloss, where it was shaded.

@@ -61,7 +61,7 @@ def scaled_maps(preset, texels):
 ABLATION = [
     ("no fit", ["fit=none"]),
     ("a quarter of the rows", ["fit.rows.rows_per_probe=19"]),
-    ("4 paths a row", ["fit.rows.paths=4"]),
+    ("4 paths a row, also where it is noisy", ["fit.rows.most_paths=4"]),
     ("no rows with bent normals", ["fit.rows.bent=0"]),
     ("no rows in the air", ["fit.rows.air=0"]),
     ("10 × as firm (lambda)", ["fit.rows.lambda=0.3"]),

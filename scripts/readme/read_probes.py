@@ -159,11 +159,17 @@ class Probes:
 
         at, i = [*voxel, facing], root
         while (word := int(words[i])) < 1 << 15:
-            below, distance = at[word >> 13] < (word >> 8 & 31), word & 255
+            of, threshold, distance, head = word >> 13, word >> 8 & 31, word & 255, 1
+            below = at[of] < threshold
+            if of == 3 and threshold >= 8:
+                # A thin wall. On it the facing tells.
+                head, beyond = 2, fraction[threshold - 8] - np.float32(words[i + 1]) / np.float32(65536)
+                on_wall = abs(beyond) <= 1 / 1024 and axis == threshold - 8
+                below = facing % 2 == 1 if on_wall else beyond < 0
             if distance == 0:
-                i += 3 if below else number(i + 1)
+                i += head + 2 if below else number(i + head)
             else:
-                i += 1 if below else distance
+                i += head if below else distance
         return word & 255, number(i + 1) if word & 1 << 14 else None
 
     def beside(self, voxel, fraction, n, mask_of):

@@ -16,8 +16,9 @@ use crate::probe::fit::{self, FitFigures};
 use crate::probe::lattice::ProbeState;
 use crate::probe::store::Occlusion;
 use crate::probe::transport::operator::Operator;
-use crate::probe::transport::solver::{Progress as Iterations, Solution};
+use crate::probe::transport::solver::{Bounce, Progress as Iterations, Solution};
 use crate::probe::transport::{self, checkpoint};
+use crate::system::progress::FINE_STEPS;
 
 /// A finished bake.
 pub struct Baked {
@@ -95,18 +96,19 @@ impl Prepared<'_, '_> {
         {
             progress = checkpoint::read(path, &identity, volume)?;
         }
-        let most = config.transport.most() as usize;
         let captures_once = config.transport.captures_once();
         let mut saver = Saver::new(circumstances.checkpoint.as_ref(), &identity);
         let solution = log.stage(
             |times| if captures_once { &mut times.bounces } else { &mut times.capture },
             if captures_once { "bounces" } else { "frames" },
-            most,
+            FINE_STEPS as usize,
             |bar| {
                 transport::run(&config.transport, &operator, volume, progress, |progress, volume| {
-                    bar.set_position(progress.solution.bounces.len() as u64);
-                    let residual = progress.solution.bounces.last().map_or(0.0, |b| b.residual);
-                    bar.set_message(format!("residual {residual:.1e}"));
+                    let bounces = &progress.solution.bounces;
+                    let residual = |bounce: Option<&Bounce>| bounce.map_or(0.0, |b| b.residual);
+                    let (first, now) = (residual(bounces.first()), residual(bounces.last()));
+                    bar.set_position(config.transport.steps_done(first, now, bounces.len()));
+                    bar.set_message(format!("residual {now:.1e}"));
                     saver.save(progress, volume);
                 })
             },
@@ -150,7 +152,9 @@ impl Prepared<'_, '_> {
         // Times stay out of the file: the same input must give the same bytes.
         let lines: Vec<_> = plan.lines.iter().map(|l| Line { saved_s: None, ..l.clone() }).collect();
         let plan = serde_json::json!({ "visibility": plan.visibility, "lines": lines });
-        let (text, query) = (config.to_ron(), config.query_record());
+        let mut query = config.query_record();
+        query.weights.glossy = query.weights.glossy.resolved(config.grid.bounds_in(self.world.scene));
+        let text = config.to_ron();
         let border = config.store.border;
         let fit = fit.map(FitFigures::record);
         let provenance =

@@ -1,6 +1,10 @@
 //! The command line: what was typed. `commands/` turns it into what it means.
 
+mod convert;
 mod export;
+mod inspect;
+mod look;
+pub mod topics;
 mod trace;
 mod values;
 
@@ -11,14 +15,18 @@ use clap::{Args, Parser, Subcommand};
 
 use crate::probe::lattice::grid::MAX_PROBES;
 
+pub use self::convert::{ConvertArgs, LatticeName};
 pub use self::export::{EngineName, ExportArgs, TargetName, VolumesName};
+pub use self::inspect::{HelpArgs, InspectArgs};
+pub use self::look::LookArgs;
 pub use self::trace::TraceArgs;
-pub use self::values::{LookAt, PictureSize};
-use self::values::{parse_exposure, parse_positive, parse_size, parse_target_error};
+pub use self::values::{LookAt, PictureSize, TraceRay};
+use self::values::{parse_exposure, parse_index, parse_positive, parse_size, parse_target_error};
 
 /// Bakes light-field probe volumes for global illumination and measures how much they leak, err and cost.
 #[derive(Debug, Parser)]
 #[command(name = "lightprobe", version, propagate_version = true, arg_required_else_help = true)]
+#[command(disable_help_subcommand = true, after_help = topics::list())]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Command,
@@ -85,20 +93,33 @@ pub enum Command {
     /// three and Bevy blend probes by distance alone, so that light comes through walls between probes. --fit chooses the values
     /// by which that is right as far as can be, --volumes auto keeps rooms apart; `render --as` says how right.
     Export(ExportArgs),
+    /// Write a page to look at a bake: one HTML file that any browser with WebGL 2 opens, without a network.
+    ///
+    /// It shows the scene, lit by the probes with visibility off, on and exact, what leaks, the probes in their own light, and
+    /// of any point its eight probes, their weights and which of them are hidden. Surfaces ask the probes in the browser; exact
+    /// visibility is traced here, at texels of about a 64th of the spacing, or larger where the scene has more than 1,048,576.
+    ///
+    /// Of more than 524,288 triangles the largest are shown. Normal maps and gloss are not.
+    View(LookArgs),
     /// Print what a probe file holds, and check its hashes.
     Inspect(InspectArgs),
+    /// Explain a command or a topic; without a name list both.
+    Help(HelpArgs),
 }
 
 /// Flags that choose a configuration.
 #[derive(Debug, Args)]
 pub struct ConfigArgs {
-    /// Configuration file; only the keys that stand in it count.
+    /// Configuration file over the preset; only the keys that stand in it count. See `lightprobe help configuration`.
     #[arg(long, value_name = "FILE.ron")]
     pub config: Option<PathBuf>,
     /// Built-in configuration that all else lies over, `default` where none is named; `list` prints their names.
     #[arg(long, value_name = "NAME|list")]
     pub preset: Option<String>,
     /// Override one key of the configuration, for example grid.spacing_m=0.5; may be repeated.
+    ///
+    /// Applied last, in order. Values are RON or JSON: grid.divisions=(8,4,8), "query.visibility=moments(power: 3)".
+    /// grid.spacing_m=None takes back a key that may be left open.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
 }
@@ -107,12 +128,14 @@ pub struct ConfigArgs {
 #[derive(Debug, Args)]
 pub struct ViewArgs {
     /// Camera of the scene by name or number, the first where not given; `render` takes `all` (a subfolder each).
+    ///
+    /// A scene without cameras gets one, with a warning.
     #[arg(long, value_name = "NAME|INDEX|all", conflicts_with = "look_at", allow_negative_numbers = true)]
     pub camera: Option<String>,
     /// Camera by origin and target, metres in world space, and vertical field of view in degrees (60 where not given).
     #[arg(long, value_name = "ox,oy,oz,tx,ty,tz[,fov]", value_parser = LookAt::from_str, allow_hyphen_values = true)]
     pub look_at: Option<LookAt>,
-    /// Size of the pictures in pixels.
+    /// Size of the pictures in pixels, sides up to 16384.
     #[arg(long, value_name = "WxH", default_value = "640x360", value_parser = PictureSize::from_str, allow_hyphen_values = true)]
     pub size: PictureSize,
 }
@@ -179,6 +202,8 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub view: ViewArgs,
     /// Exposure of the PNG pictures, in powers of two; from the picture where not given.
+    ///
+    /// Then it brings the log-average of the reference to 18 % grey, without one that of the picture with exact visibility.
     #[arg(long, value_name = "EV", allow_hyphen_values = true, value_parser = parse_exposure)]
     pub exposure: Option<f32>,
     /// Path-trace a reference of every camera with SPP samples per pixel, and report how far the probes are from it.
@@ -187,15 +212,17 @@ pub struct RenderArgs {
     #[arg(long, value_name = "SPP", allow_negative_numbers = true, conflicts_with = "reference_image", value_parser = clap::value_parser!(u32).range(1..=MAX_SPP))]
     pub reference: Option<u32>,
     /// The same with a reference that is there: of this camera and size, as `reference` or --reference wrote it.
+    ///
+    /// It needs the layers `irradiance_indirect` and `beauty`. A file that names another scene or camera is refused.
     #[arg(long, value_name = "FILE.exr")]
     pub reference_image: Option<PathBuf>,
     /// Also light the probes themselves by full paths, and report how far the file's are from that.
     ///
-    /// Takes longer than all else; with --reference the paths are in proportion to its samples per pixel. The report gains an
-    /// entry with the path-traced probes under exact visibility: what it still errs is interpolation.
+    /// Takes longer than all else. Eight runs trace a path from every captured hit, or SPP/128 paths with --reference SPP. The
+    /// report gains an entry with these probes under exact visibility: its error is interpolation. Not for fitted presets.
     #[arg(long)]
     pub bake_error: bool,
-    /// Render although the scene has changed since the bake.
+    /// Render although the scene's files or its sky are not those of the bake.
     #[arg(long)]
     pub allow_scene_change: bool,
 }
@@ -207,7 +234,7 @@ pub struct ReferenceArgs {
     pub scene: PathBuf,
     #[command(flatten)]
     pub trace: TraceArgs,
-    /// Picture to write, in layers.
+    /// Picture to write, in layers; the name ends in .exr.
     #[arg(short, long, value_name = "FILE.exr")]
     pub output: PathBuf,
     /// Samples per pixel in all, those of a resumed file included. Rounded up to a multiple of 16; 1 to 15 are taken as
@@ -223,7 +250,7 @@ pub struct ReferenceArgs {
     pub view: ViewArgs,
     /// Most reflections between a light and the surface in the picture; all where not given. 0 leaves light that comes
     /// straight from emitters and the sky.
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_index)]
     pub max_bounces: Option<u32>,
     /// Scale samples down that bring more irradiance than this, W·m⁻²: hides rare bright pixels, and makes the picture
     /// too dark. Off where not given.
@@ -325,43 +352,6 @@ pub struct DiffArgs {
     /// the old BASE or the new one; sides that cannot be compared leave it alone.
     #[arg(long)]
     pub update_baseline: bool,
-}
-
-#[derive(Debug, Args)]
-pub struct ConvertArgs {
-    /// Probe file that `bake` wrote.
-    #[arg(value_name = "PROBES")]
-    pub probes: PathBuf,
-    /// Scene that it was baked from: a .glb or .gltf file.
-    #[arg(value_name = "SCENE")]
-    pub scene: PathBuf,
-    #[command(flatten)]
-    pub trace: TraceArgs,
-    /// Probe file to write.
-    #[arg(short, long, value_name = "OUT.probes")]
-    pub output: PathBuf,
-    /// The lattice that the probes are put on.
-    #[arg(long, value_enum)]
-    pub to: LatticeName,
-    /// Convert although the scene has changed since the bake.
-    #[arg(long)]
-    pub allow_scene_change: bool,
-}
-
-/// Lattices by the names of the command line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum LatticeName {
-    Uniform,
-}
-
-#[derive(Debug, Args)]
-pub struct InspectArgs {
-    /// Probe file that `bake` wrote.
-    #[arg(value_name = "PROBES")]
-    pub probes: PathBuf,
-    /// Also print one probe: position, state, irradiance along the six axes.
-    #[arg(long, value_name = "I", allow_negative_numbers = true)]
-    pub probe: Option<u32>,
 }
 
 #[cfg(test)]

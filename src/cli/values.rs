@@ -55,6 +55,30 @@ impl FromStr for LookAt {
     }
 }
 
+/// A ray in world space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TraceRay {
+    pub origin: [f64; 3],
+    /// Of any length above zero.
+    pub direction: [f64; 3],
+}
+
+impl FromStr for TraceRay {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<TraceRay, String> {
+        let numbers: Option<Vec<f64>> =
+            text.split(',').map(|s| s.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
+        let Some(&[a, b, c, d, e, f]) = numbers.as_deref() else {
+            return Err("write six numbers, a point and a direction: ox,oy,oz,dx,dy,dz".into());
+        };
+        if [d, e, f] == [0.0; 3] {
+            return Err("the direction has no length".into());
+        }
+        Ok(TraceRay { origin: [a, b, c], direction: [d, e, f] })
+    }
+}
+
 pub fn parse_exposure(text: &str) -> Result<f32, String> {
     let ev: Option<f32> = text.parse().ok().filter(|ev: &f32| ev.abs() <= 100.0);
     ev.ok_or_else(|| "write a number from -100 to 100".into())
@@ -70,6 +94,19 @@ pub fn parse_positive(text: &str) -> Result<f32, String> {
 pub fn parse_target_error(text: &str) -> Result<f64, String> {
     let number: Option<f64> = text.parse().ok().filter(|x| (1e-6..=1.0).contains(x));
     number.ok_or_else(|| "write a share from 1e-6 to 1, such as 0.1 for 10 %".into())
+}
+
+pub fn parse_index(text: &str) -> Result<u32, String> {
+    text.parse().map_err(|_| format!("write a whole number from 0 to {}, such as 8", u32::MAX))
+}
+
+pub fn parse_seed(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| format!("write a whole number from 0 to {}, such as 1", u64::MAX))
+}
+
+/// Numbers that are too large are refused later, with what makes sense.
+pub fn parse_threads(text: &str) -> Result<usize, String> {
+    text.parse().map_err(|_| "write a whole number, such as 2; 0 means one thread per core".into())
 }
 
 pub fn parse_finite(text: &str) -> Result<f64, String> {

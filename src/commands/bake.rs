@@ -4,10 +4,9 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use glam::DVec3;
 
 use super::session::{Opening, Session, list_presets, lists_presets, resolve_config};
-use super::{Console, target, tell, write_json};
+use super::{Console, grid_advice, target, tell, write_json};
 use crate::bake::{Baked, Checkpoint, Circumstances, Prepared, prepare};
 use crate::cli::BakeArgs;
 use crate::config::Config;
@@ -17,8 +16,9 @@ use crate::probe::lattice::ProbeState;
 use crate::probe::transport::checkpoint;
 use crate::report::bake::{BakeReport, BytesPerProbe, SCHEMA, SolverReport};
 use crate::report::table::{Column, Table};
-use crate::scene::{Detail, Scene};
+use crate::scene::Detail;
 use crate::system::format;
+use crate::system::interrupt;
 use crate::system::memory::peak_memory_bytes;
 use crate::system::output::Named;
 
@@ -34,7 +34,7 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     tell::configuration(console, &args.config);
     let session = Session::open(opening(args, &config)?, console)?;
     let (world, accel_build_s) = session.world()?;
-    warn_about_bounds(&config, &session.scene, console);
+    grid_advice::warn(&config.grid, &session.scene, console);
     if let Some(error) = args.target_error {
         let (found, file_bytes) = target::run(args, error, &config, (&session, &world), accel_build_s)?;
         let config = found.config;
@@ -103,9 +103,13 @@ fn circumstances(args: &BakeArgs, config: &Config, session: &Session) -> Result<
     if let Some(Checkpoint { path, resume: true, .. }) = &checkpoint {
         if path.exists() {
             checkpoint::check(path, &checkpoint::identity(&session.scene.blake3, session.seed, &config.to_ron()))?;
+            session.console.note(format!("going on from {}", path.display()));
         } else {
             session.console.warn(format!("--resume: there is no {}; starting anew", path.display()));
         }
+    }
+    if let Some(Checkpoint { path, resume, .. }) = &checkpoint {
+        interrupt::leaves(path.clone(), "the same command with --resume goes on from there", *resume);
     }
     Ok(Circumstances {
         seed: session.seed,
@@ -124,18 +128,6 @@ fn outputs(args: &BakeArgs) -> Result<Vec<Named>> {
     let report = args.report.as_ref().map(|report| Named::new("--report", report));
     let checkpoint = Named::new("the file that --resume reads", checkpoint::path_for(output));
     Ok([Named::new("-o", output), checkpoint].into_iter().chain(report).collect())
-}
-
-/// Probes away from the scene can be meant, for a plain below them; more often a unit or an axis is wrong.
-fn warn_about_bounds(config: &Config, scene: &Scene, console: &Console) {
-    let (Some(bounds), Some((low, high))) = (config.grid.bounds, scene.mesh.bounds()) else { return };
-    let (low, high) = (scene.origin_world + low.as_dvec3(), scene.origin_world + high.as_dvec3());
-    if DVec3::from(bounds.max).cmplt(low).any() || DVec3::from(bounds.min).cmpgt(high).any() {
-        console.warn(format!(
-            "grid.bounds lie wholly outside of the scene, which spans {low} to {high} m: its surfaces use the probes at \
-             the rim"
-        ));
-    }
 }
 
 fn dry_run(prepared: &Prepared, circumstances: &Circumstances, console: &Console) -> Result<()> {

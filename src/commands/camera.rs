@@ -34,7 +34,7 @@ pub fn cameras(args: &ViewArgs, world: &World, console: &Console) -> Result<Vec<
             Some(camera) => camera.clone(),
             None => {
                 let bounds = scene.mesh.bounds().unwrap_or((Vec3::NEG_ONE, Vec3::ONE));
-                let (camera, inside) = frame(world, bounds);
+                let (camera, inside) = frame(world, bounds, args.size.width as f32 / args.size.height as f32);
                 let from = if inside { "from inside" } else { "from outside" };
                 console.warn(format!("the scene has no camera: framed it {from}; use --look-at for another view"));
                 camera

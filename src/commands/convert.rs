@@ -4,7 +4,7 @@ use anyhow::{Context, Result, anyhow};
 use serde_json::json;
 
 use super::session::{Opening, Probes, Session, inputs};
-use super::{Console, tell};
+use super::{Console, kinds, tell};
 use crate::bake::convert::to_uniform;
 use crate::cli::ConvertArgs;
 use crate::config::Layers;
@@ -15,6 +15,9 @@ use crate::system::format;
 use crate::system::output::{Named, check_outputs};
 
 pub fn run(args: &ConvertArgs, console: &Console) -> Result<()> {
+    let usage = "convert PROBES SCENE -o OUT.probes --to uniform";
+    kinds::expect_probes(&args.probes, usage)?;
+    kinds::expect_scene(&args.scene, usage)?;
     let place = args.probes.display().to_string();
     let output = Named::new("-o", &args.output);
     let read = Named::new("the probe file", &args.probes);

@@ -6,7 +6,7 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use serde_json::{Value, json};
 
 use super::session::{Opening, Probes, Session, inputs, set_threads};
-use super::{Console, tell};
+use super::{Console, kinds, tell};
 use crate::cli::{ExportArgs, TargetName, VolumesName};
 use crate::config::{Config, Layers};
 use crate::export::ddgi::Ddgi;
@@ -42,6 +42,7 @@ struct Made {
 }
 
 pub fn run(args: &ExportArgs, console: &Console) -> Result<()> {
+    kinds::expect_probes(&args.probes, "export PROBES --to ENGINE -o DIR --scene SCENE")?;
     let to = Target::from(args.to);
     check_arguments(args, to)?;
     check_folder(&args.output)?;

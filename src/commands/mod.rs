@@ -5,13 +5,17 @@ mod camera;
 pub mod convert;
 pub mod diff_report;
 pub mod export;
+mod grid_advice;
+pub mod help;
 pub mod inspect;
+mod kinds;
 pub mod reference;
 pub mod render;
 mod session;
 pub mod sweep;
 mod target;
 mod tell;
+pub mod view;
 
 use std::io::Write;
 use std::path::Path;
@@ -19,9 +23,11 @@ use std::path::Path;
 use anyhow::{Context, Result};
 
 use crate::cli::{Cli, Command, OutputFlags, PictureSize};
+use crate::system::interrupt;
 use crate::system::memory::{TooLittleMemory, check_available};
 use crate::system::output::write_atomically;
 use crate::system::progress::Progress;
+use crate::system::terminal;
 
 /// How a command speaks to its user: results on standard output, all else on standard error.
 #[derive(Debug, Clone, Copy)]
@@ -59,7 +65,9 @@ impl Console {
 
     /// Prints a result. A reader that has gone away (`| head`) is no error, and changes nothing of what is done.
     pub fn print(&self, text: &str) -> Result<()> {
-        match writeln!(std::io::stdout().lock(), "{}", text.trim_end()) {
+        let text = text.trim_end();
+        let text = if self.json { text.to_owned() } else { terminal::fitted(text) };
+        match writeln!(std::io::stdout().lock(), "{text}") {
             Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
             done => done.context("cannot write to standard output"),
         }
@@ -82,6 +90,7 @@ pub enum Outcome {
 
 /// Runs the command that was typed.
 pub fn run(cli: Cli) -> Result<Outcome> {
+    interrupt::listen();
     let console = Console::new(&cli.output);
     match cli.command {
         Command::Bake(args) => bake::run(&args, &console)?,
@@ -91,7 +100,9 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::DiffReport(args) => return diff_report::run(&args, &console),
         Command::Convert(args) => convert::run(&args, &console)?,
         Command::Export(args) => export::run(&args, &console)?,
+        Command::View(args) => view::run(&args, &console)?,
         Command::Inspect(args) => inspect::run(&args, &console)?,
+        Command::Help(args) => help::run(&args, &console)?,
     }
     Ok(Outcome::Done)
 }

@@ -22,6 +22,7 @@ use crate::shade::points::has_blend;
 use crate::shade::reference::{Reference, ReferenceSettings, State, Tracing};
 use crate::shade::reference_file::{Identity, resume};
 use crate::system::format;
+use crate::system::interrupt;
 use crate::system::memory::peak_memory_bytes;
 use crate::system::output::Named;
 
@@ -66,7 +67,12 @@ pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
             .warn(format!("{file} has {spp} samples per pixel already: there is nothing to add; raise --spp for more"));
     }
     let mut times = ReferenceTimes { load: session.load_s, accel_build: accel_build_s, ..Default::default() };
-    times.trace = trace(&mut tracing, &args.output, &identity, console)?;
+    times.trace = trace(
+        &mut tracing,
+        (&args.output, &identity),
+        ("the same command with --resume adds to it", resumed.spp > 0),
+        console,
+    )?;
     let reference = tracing.develop();
     tell::traced(console, reference.spp, reference.rays, times.trace);
     if !is_complete {
@@ -186,6 +192,9 @@ fn previous(
         return Ok(None);
     }
     let state = resume(&args.output, identity, world, settings)?;
+    if state.is_some() {
+        console.note(format!("going on from {}", args.output.display()));
+    }
     if state.is_none() {
         console.warn(format!("--resume: {} has less than {BLOCK} samples; beginning anew", args.output.display()));
     }
@@ -193,8 +202,14 @@ fn previous(
 }
 
 /// Adds blocks until there are enough, and saves what there is now and then; the seconds without saving.
-pub(super) fn trace(tracing: &mut Tracing, path: &Path, identity: &Identity, console: &Console) -> Result<f64> {
+pub(super) fn trace(
+    tracing: &mut Tracing,
+    (path, identity): (&Path, &Identity),
+    (how_to_go_on, resumed): (&str, bool),
+    console: &Console,
+) -> Result<f64> {
     let bar = console.progress.stage("reference", tracing.remaining() as usize);
+    interrupt::leaves(path.to_owned(), how_to_go_on, resumed);
     let (started, mut saved, mut saving) = (Instant::now(), Instant::now(), Duration::ZERO);
     while tracing.remaining() > 0 {
         tracing.advance();

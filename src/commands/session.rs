@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::{Result, bail, ensure};
 use serde::Serialize;
 
-use super::{Console, tell};
+use super::{Console, kinds, tell};
 use crate::cli::{ConfigArgs, TraceArgs};
 use crate::config::{Config, Layers, presets};
 use crate::light::World;
@@ -73,6 +73,7 @@ impl<'c> Session<'c> {
     /// An output cannot be written, or is an input; the scene cannot be loaded, or is another than that of the probes.
     pub fn open(opening: Opening, console: &'c Console) -> Result<Session<'c>> {
         let Opening { scene: path, trace, light, .. } = opening;
+        kinds::expect_scene(path, "COMMAND SCENE …")?;
         check_sky_flags(trace, light.sky)?;
         check_outputs(&opening.outputs, &inputs(path, trace, opening.inputs))?;
         let threads = set_threads(trace.threads)?;

@@ -27,6 +27,11 @@ const RENAMED: &[(&str, &str)] = &[
     ("solver.albedo_max", "materials.albedo_max"),
 ];
 
+/// Keys of before that still work.
+pub fn old_keys() -> impl Iterator<Item = &'static str> {
+    RENAMED.iter().map(|(old, _)| *old).chain(["query.visibility", "capture.reflected"])
+}
+
 /// Sections that there are no longer.
 pub fn is_old_section(path: &str) -> bool {
     matches!(path, "filter" | "encoding" | "solver")

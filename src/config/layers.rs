@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::assignments::{self, Assignment, below, choice};
 use super::ron_text::{ConfigError, ron_options};
 use super::settings::Config;
-use super::{aliases, choices, messages, presets};
+use super::{aliases, choices, messages, nearest, presets};
 use crate::system::input::read_file;
 
 /// Assignments in the order in which they count: a later one replaces an earlier one.
@@ -228,6 +228,11 @@ impl Tree {
             }
             Err(_) => None,
         };
+        if self.at(path).is_none()
+            && let Some(meant) = nearest::elsewhere(&self.tree, path)
+        {
+            return Err(error(format!("there is no key '{path}'; did you mean {meant}?")));
+        }
         set(&mut self.tree, path, parsed.unwrap_or_else(|| plain(value))).map_err(error)?;
         self.config = serde_json::from_value::<Config>(self.tree.clone())
             .map_err(|e| error(explain(&e, alone.as_ref().err(), value)))?;

@@ -82,7 +82,9 @@ pub fn unknown_key<'k>(found: &str, known: impl Iterator<Item = &'k str> + Clone
 fn suggestion<'k>(found: &str, known: impl Iterator<Item = &'k &'k str>) -> String {
     let distance = |name: &str| match name.starts_with(found) && found.len() >= 3 {
         true => 0,
-        false => strsim::damerau_levenshtein(name, found),
+        // Units are left out more often than they are misspelt.
+        false => strsim::damerau_levenshtein(name, found)
+            .min(strsim::damerau_levenshtein(name.trim_end_matches("_m"), found)),
     };
     let nearest = known.map(|name| (distance(name), *name)).min();
     match nearest {
@@ -98,12 +100,14 @@ mod tests {
 
     #[test]
     fn only_near_names_are_suggested() {
-        let keys = ["spacing_m", "bounds", "grid"];
-        for (found, meant) in [("spacing", "spacing_m"), ("gird", "grid"), ("bouds", "bounds")] {
+        let keys = ["spacing_m", "bounds", "grid", "padding"];
+        for (found, meant) in
+            [("spacing", "spacing_m"), ("spaceing", "spacing_m"), ("gird", "grid"), ("bouds", "bounds")]
+        {
             let message = unknown_key(found, keys.into_iter());
             assert!(message.contains(&format!("did you mean '{meant}'")), "{message}");
         }
         let message = unknown_key("seed", keys.into_iter());
-        assert!(!message.contains("did you mean") && message.contains("spacing_m, bounds, grid"), "{message}");
+        assert!(!message.contains("did you mean") && message.contains("spacing_m, bounds, grid, padding"), "{message}");
     }
 }

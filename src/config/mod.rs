@@ -10,6 +10,7 @@ mod check;
 mod choices;
 mod layers;
 pub(crate) mod messages;
+mod nearest;
 pub mod presets;
 mod ron_text;
 mod settings;

@@ -12,10 +12,15 @@ pub enum ConfigError {
     Unreadable { path: PathBuf, cause: std::io::Error },
     #[error("{place}: {what}")]
     Invalid { place: String, what: String },
-    #[error("there is no preset '{name}'; there are: {known}")]
+    #[error("there is no preset '{name}'{}; there are: {known}", if is_file(name) { " (a file goes with --config)" } else { "" })]
     NoPreset { name: String, known: String },
     #[error("{place}: {key} is {value}: {rule}")]
     OutOfRange { place: String, key: &'static str, value: String, rule: &'static str },
+}
+
+/// Whether a name is that of a file rather than of a preset.
+fn is_file(name: &str) -> bool {
+    name.contains('/') || name.ends_with(".ron")
 }
 
 /// Reads RON text as configurations are written; `place` names it in errors.

@@ -16,6 +16,8 @@ pub struct Gate {
     pub value: Option<f64>,
     /// Unit of `value` and `threshold`, such as "W/m²" or "%"; empty for pure numbers.
     pub unit: &'static str,
+    /// Unit of `base` and `candidate`, which differs where `value` is a share of them.
+    pub side_unit: &'static str,
     /// What the value must not exceed. `None`: only shown.
     pub threshold: Option<f64>,
     /// 1 − value/threshold: 1 untouched, 0 at the limit, negative beyond.
@@ -79,6 +81,7 @@ mod tests {
             candidate: None,
             value: None,
             unit: "",
+            side_unit: "",
             threshold: Some(1.0),
             margin,
             standard_error: None,

@@ -18,9 +18,29 @@ pub fn in_unit(value: Option<f64>, unit: &str) -> String {
     format::or_undefined(value, |v| format!("{}{unit}", format::significant(v, 3)))
 }
 
-/// The figure of one side, which a gate in percent has in a unit of its own.
+/// The figure of one side in its own unit.
 pub fn of_side(value: Option<f64>, unit: &str) -> String {
-    if unit == BYTES { in_unit(value, unit) } else { format::or_undefined(value, |v| format::significant(v, 4)) }
+    if unit == BYTES {
+        return in_unit(value, unit);
+    }
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    format::or_undefined(value, |v| format!("{}{unit}", format::significant(v, 4)))
+}
+
+/// The unit of a figure by its place in a report: keys end in it.
+pub fn unit_of(place: &str) -> &'static str {
+    let has = |part: &str| place.split('.').any(|key| key == part);
+    let ends = |unit: &str| place.split('.').any(|key| key.ends_with(unit));
+    match () {
+        () if ends("_bytes") || ends("bytes_per_probe") || has("bytes") => BYTES,
+        () if ends("_ns") => "ns",
+        () if ends("_ms") => "ms",
+        () if ends("_s") => "s",
+        () if has("irradiance") || has("energy") || has("region_percent") || ends("irradiance_indirect_mean") => {
+            "W·m⁻²"
+        }
+        () => "",
+    }
 }
 
 /// What a list says of a gate.
@@ -59,8 +79,20 @@ mod tests {
     fn bytes_are_sizes() {
         assert_eq!(in_unit(Some(-2048.0), BYTES), "-2.00 KiB");
         assert_eq!(of_side(Some(2048.0), BYTES), "2.00 KiB");
-        assert_eq!((in_unit(Some(2.5), "%"), of_side(Some(2.5), "%")), ("2.50 %".to_owned(), "2.500".to_owned()));
+        assert_eq!((in_unit(Some(2.5), "%"), of_side(Some(2.5), "%")), ("2.50 %".to_owned(), "2.500 %".to_owned()));
         assert_eq!(of_side(None, BYTES), format::UNDEFINED);
+        for (place, unit) in [
+            ("time_s.total", "s"),
+            ("methods.visibility_on.shade_ms.median", "ms"),
+            ("methods.visibility_on.lookup_ns", "ns"),
+            ("configurations.a.figures.bake_s.mean", "s"),
+            ("bytes_per_probe.file", BYTES),
+            ("peak_memory_bytes", BYTES),
+            ("irradiance", "W·m⁻²"),
+            ("methods.visibility_on.leak.light", ""),
+        ] {
+            assert_eq!(unit_of(place), unit, "{place}");
+        }
     }
 
     #[test]
@@ -72,6 +104,7 @@ mod tests {
             candidate: Some(1.0),
             value,
             unit: "%",
+            side_unit: "",
             threshold: Some(threshold),
             margin,
             standard_error: None,

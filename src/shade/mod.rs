@@ -5,13 +5,15 @@ pub mod block_mean;
 mod develop;
 pub mod film;
 pub mod framing;
+pub mod glossy;
 pub mod held_out;
 pub mod layers;
-
 pub mod outlook;
 pub mod points;
 pub mod reference;
 pub mod reference_file;
 pub mod regions;
 pub mod spheres;
+pub mod texels;
+pub mod traced;
 pub mod visibility_modes;

@@ -11,7 +11,7 @@ use crate::scene::Camera;
 use crate::scene::camera::Projection;
 
 /// Radius of the spheres, as a share of the smallest grid spacing.
-const RADIUS: f32 = 0.08;
+pub const RADIUS: f32 = 0.08;
 
 /// sRGB colour of probes inside geometry.
 pub const INSIDE_COLOR: [u8; 3] = [214, 48, 49];

@@ -9,6 +9,8 @@ use rayon::prelude::*;
 use super::points::ImagePoint;
 use crate::light::World;
 use crate::light::contact::{Contacts, Facet, sight_line};
+use crate::light::surface::SurfacePoint;
+use crate::probe::ProbeIndex;
 use crate::probe::query::{Answers, Visibility};
 use crate::trace::Ray;
 
@@ -60,22 +62,29 @@ impl VisibilityMode {
 /// offset. Probes in the plane of a surface follow [`sight_line`].
 pub fn exact_masks(world: &World, query: &impl Answers, points: &[ImagePoint]) -> Vec<u8> {
     let contacts = Contacts::of_points(world.scene, query.positions());
-    points
-        .par_iter()
-        .map(|point| {
-            let surface = &point.surface;
-            let facet =
-                Facet { position: surface.position, normal: surface.geometric_normal, offset: surface.ray_offset };
-            let corners = query.corners(&point.query);
-            corners.into_iter().enumerate().fold(0, |mask, (i, probe)| {
-                let contact = contacts.of(probe.0 as usize);
-                let is_free = |(origin, target)| !world.tracer.occluded(Ray::segment(origin, target, point.pixel));
-                let position = query.positions()[probe.0 as usize];
-                let visible = query.is_active(probe) && sight_line(&facet, position, contact).is_some_and(is_free);
-                mask | u8::from(visible) << i
-            })
-        })
-        .collect()
+    let mask = |point: &ImagePoint| {
+        exact_mask(world, query, &contacts, &point.surface, query.corners(&point.query), point.pixel)
+    };
+    points.par_iter().map(mask).collect()
+}
+
+/// The same for eight probes and one point of a surface. `contacts` are those of the probes; `salt` is the rays'.
+pub fn exact_mask(
+    world: &World,
+    query: &impl Answers,
+    contacts: &Contacts,
+    surface: &SurfacePoint,
+    corners: [ProbeIndex; 8],
+    salt: u32,
+) -> u8 {
+    let facet = Facet { position: surface.position, normal: surface.geometric_normal, offset: surface.ray_offset };
+    corners.into_iter().enumerate().fold(0, |mask, (i, probe)| {
+        let contact = contacts.of(probe.0 as usize);
+        let is_free = |(origin, target)| !world.tracer.occluded(Ray::segment(origin, target, salt));
+        let position = query.positions()[probe.0 as usize];
+        let visible = query.is_active(probe) && sight_line(&facet, position, contact).is_some_and(is_free);
+        mask | u8::from(visible) << i
+    })
 }
 
 /// Irradiance from the probes at every point, W·m⁻².

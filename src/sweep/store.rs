@@ -21,7 +21,7 @@ use crate::system::output::{create_folder, write_atomically};
 const RESULTS: &str = concat!("lightprobe-sweep-run/2, ", env!("CARGO_PKG_VERSION"));
 
 /// Folder of runs in a sweep's folder.
-const FOLDER: &str = "runs";
+pub const FOLDER: &str = "runs";
 
 /// Name of a run: the hash of its inputs.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -2,6 +2,8 @@
 
 pub mod format;
 pub mod input;
+pub mod interrupt;
 pub mod memory;
 pub mod output;
 pub mod progress;
+pub mod terminal;

@@ -33,6 +33,8 @@ fn main() -> ExitCode {
         test!(truth::probes_behind_a_door_ajar_hold_what_paths_bring, Need::Shared),
         test!(python::safetensors_opens_a_probe_file, Need::Safetensors),
         test!(python::the_script_of_the_readme_asks_as_the_tool_does, Need::Safetensors),
+        test!(python::the_example_of_the_probe_file_runs, Need::Safetensors),
+        test!(python::the_script_says_which_package_is_missing, Need::Python),
         test!(scenes::scenes_are_what_the_script_writes, Need::Python),
         test!(policy::what_is_missing_is_ignored_and_said),
         test!(policy::what_is_missing_fails_in_continuous_integration),

@@ -117,3 +117,28 @@ pub fn the_script_of_the_readme_asks_as_the_tool_does() {
     }
     assert!(lit > 2500 && dark > 500, "{lit} lit, {dark} dark");
 }
+
+/// The example of src/probe/README.md, on the file that its commands make.
+pub fn the_example_of_the_probe_file_runs() {
+    let folder = Folder::new();
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let readme = std::fs::read_to_string(root.join("src/probe/README.md")).unwrap();
+    let (_, rest) = readme.split_once("```python\n").unwrap();
+    let (example, _) = rest.split_once("```").unwrap();
+    std::fs::create_dir(folder.path().join("out")).unwrap();
+    let baked = bake(&folder, &scene("two_rooms_sealed"), "--set grid.spacing_m=1");
+    std::fs::copy(&baked.path, folder.path().join("out/two_rooms_sealed.probes")).unwrap();
+    let output = Command::new("python3").args(["-c", example]).current_dir(folder.path()).output().unwrap();
+    let (told, printed) = (String::from_utf8_lossy(&output.stderr), String::from_utf8_lossy(&output.stdout));
+    assert!(output.status.success(), "{told}");
+    assert!(printed.contains("[10, 5, 6] 300 active") && printed.contains("probe 132 stands at"), "{printed}");
+}
+
+/// Without the site's folders Python knows no packages.
+pub fn the_script_says_which_package_is_missing() {
+    let script = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/readme/read_probes.py");
+    let output = Command::new("python3").args(["-S", "-E", text(&script)]).output().unwrap();
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && told.contains("pip install numpy safetensors"), "{told}");
+    assert!(!told.contains("Traceback"), "{told}");
+}

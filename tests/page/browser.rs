@@ -66,6 +66,17 @@ impl Opened {
     }
 
     pub fn with_scripts(html: &str, width: u32, height: u32, scripts: bool) -> Opened {
+        Opened::with_flags(html, (width, height), scripts, &[])
+    }
+
+    /// A page that draws with WebGL, in software on machines without a graphics card too.
+    pub fn drawing(html: &str, width: u32, height: u32) -> Opened {
+        const BY_SOFTWARE: [&str; 3] =
+            ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"];
+        Opened::with_flags(html, (width, height), true, &BY_SOFTWARE)
+    }
+
+    fn with_flags(html: &str, (width, height): (u32, u32), scripts: bool, flags: &[&str]) -> Opened {
         let path = browser().expect("tests that open a page run where there is a browser");
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("index.html");
@@ -76,8 +87,9 @@ impl Opened {
             sandbox: false,
             user_data_dir: Some(folder.path().join("profile")),
             window_size: Some((width, height)),
-            args: args.map(OsStr::new).to_vec(),
+            args: args.iter().chain(flags).map(OsStr::new).collect(),
             idle_browser_timeout: 5 * PATIENCE,
+            enable_gpu: !flags.is_empty(),
             ..LaunchOptions::default()
         };
         let browser = Browser::new(options).expect("the browser starts");
@@ -220,6 +232,7 @@ impl Opened {
         let code = match key {
             "Tab" => 9,
             "Enter" => 13,
+            "Escape" => 27,
             " " => 32,
             "End" => 35,
             "Home" => 36,

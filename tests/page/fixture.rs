@@ -60,6 +60,7 @@ pub fn gate(name: &str, item: &str, value: f64, threshold: f64) -> Gate {
         candidate: Some(0.65 + value),
         value: Some(value),
         unit: "",
+        side_unit: "",
         threshold: Some(threshold),
         margin: Some(1.0 - value / threshold),
         standard_error: (value > 0.02).then_some(0.1 * value),

@@ -168,8 +168,10 @@ fn mistyped_values() {
         let message = refuse(&["bake", text(&furnace), "--print-config", "--preset", "physical", "--set", set]);
         assert!(words.iter().all(|word| message.contains(word)), "{message}");
     }
-    let message = refuse(&["bake", text(&furnace), "--print-config", "--set", "seed=1"]);
+    let message = refuse(&["bake", text(&furnace), "--print-config", "--set", "colour=1"]);
     assert!(!message.contains("did you mean"), "{message}");
+    let message = refuse(&["bake", text(&furnace), "--print-config", "--set", "seed=1"]);
+    assert!(message.contains("did you mean the flag --seed"), "{message}");
     for flag in ["--threads", "--seed", "--memory-budget"] {
         let run = run(&["bake", text(&furnace), "--dry-run", flag, "-1"]);
         assert_eq!(run.code, Some(2));

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 
 use crate::cli::{PictureSize, RenderArgs};
 use crate::commands::{Console, check_picture_memory};
@@ -33,14 +33,21 @@ const PICTURES: &[&str] = &[
     "visibility_on.png",
     "visibility_ray.exr",
     "visibility_ray.png",
+    "glossy.png",
     "leak.exr",
     "leak.png",
     "probes.png",
-    "report.json",
+    REPORT,
 ];
+
+/// All figures. Last to be written.
+pub const REPORT: &str = "report.json";
 
 /// Those that it gets besides where there is a reference.
 const COMPARISONS: &[&str] = &["error_off.exr", "error_off.png", "error_on.exr", "error_on.png", "reference.png"];
+
+/// Pictures of engines' look-ups.
+const OF_ENGINES: &[Target] = &[Target::Three, Target::Bevy, Target::Ddgi];
 
 /// A reference that is there may stay in its place: it is copied onto itself.
 const REFERENCE: &str = "reference.exr";
@@ -55,6 +62,34 @@ pub fn pictures(args: &RenderArgs, folder: &Path) -> Vec<Named> {
     });
     let own = PICTURES.iter().chain(comparisons).map(|name| Named::new("-o", folder.join(name)));
     own.chain(of_engine).collect()
+}
+
+/// Removes what an earlier render left in the folder and this one does not replace: a reference and maps of errors beside
+/// pictures that they are not of. Folders that no render wrote are left alone.
+pub fn remove_stale(args: &RenderArgs, folder: &Path) -> Result<()> {
+    let report = folder.join(REPORT);
+    let is_ours = std::fs::read_to_string(&report).is_ok_and(|text| {
+        let report: Result<serde_json::Value, _> = serde_json::from_str(&text);
+        report.is_ok_and(|report| report["command"] == "render")
+    });
+    if !is_ours {
+        return Ok(());
+    }
+    let of_engines =
+        OF_ENGINES.iter().flat_map(|engine| ["exr", "png"].map(|kind| format!("{}.{kind}", engine.method())));
+    let all = COMPARISONS.iter().chain([&REFERENCE]).map(|name| (*name).to_owned()).chain(of_engines);
+    let new = pictures(args, folder);
+    // The report goes first: without it the folder is no result.
+    let stale = all.map(|name| folder.join(name)).filter(|path| new.iter().all(|picture| picture.path != *path));
+    for path in [report].into_iter().chain(stale) {
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                return Err(error).with_context(|| format!("cannot remove {} of an earlier render", path.display()));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// Refuses a folder in which not all pictures can be written, before any is made.

@@ -10,12 +10,12 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow, bail};
 
-use self::check::{check_pictures, check_view, pictures};
+use self::check::{REPORT, check_pictures, check_view, pictures, remove_stale};
 use self::reference::{Reference, Shot, Source};
 use super::camera::cameras;
 use super::export::{self, unfitted};
 use super::session::{Opening, Probes, Session, inputs};
-use super::{Console, tell, write_json};
+use super::{Console, kinds, tell, write_json};
 use crate::cli::{EngineName, RenderArgs};
 use crate::config::Config;
 use crate::evaluate::{BakedTruth, Comparison, PATH_RAY, Scenery, Seen, Shaded};
@@ -25,12 +25,19 @@ use crate::probe::Volume;
 use crate::probe::file::{self, LightRecord, ProbeFile};
 use crate::probe::query::{Answers, Query, QuerySettings};
 use crate::report::baked;
-use crate::report::render::{RenderReport, RenderTimes, SCHEMA};
+use crate::report::render::{MethodReport, RenderReport, RenderTimes, SCHEMA};
 use crate::scene::{Camera, Detail};
 use crate::shade::points::see;
 use crate::shade::visibility_modes::VisibilityMode;
+use crate::system::format;
 use crate::system::memory::peak_memory_bytes;
 use crate::system::output::{Named, create_folder};
+
+/// Beyond this a picture shows something else than was meant: 2¹⁰ times as much light as a lit room, or as little.
+const EXTREME_EV: f32 = 10.0;
+
+/// Share of a picture outside the probes' hull that is worth a word.
+const MUCH_OUTSIDE: f64 = 0.01;
 
 /// What all cameras of a run share.
 struct Run<'a, A> {
@@ -71,6 +78,9 @@ impl From<EngineName> for Target {
 }
 
 pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
+    let usage = "render SCENE PROBES -o DIR";
+    kinds::expect_scene(&args.scene, usage)?;
+    kinds::expect_probes(&args.probes, usage)?;
     check_pictures(args, &args.output, &read(args))?;
     let reference = Source::of(args)?;
     if args.probes.is_dir() {
@@ -78,11 +88,16 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
     }
     let probes = file::read(&args.probes)?;
     let origin = Probes::of(&args.probes, &probes, args.allow_scene_change);
-    let session = Session::open(opening(args, probes.query.light, origin), console)?;
+    let shows_gloss = !probes.query.weights.glossy.is_none();
+    let detail = if shows_gloss { Detail::GLOSSY } else { Detail::PICTURE };
+    let session = Session::open(opening(args, probes.query.light, origin, detail), console)?;
     let (world, accel_build_s) = session.world()?;
     tell::probes(console, &args.probes, &probes);
     let cameras = prepare(args, &session, &world)?;
-    let volume = probes.volume_as_planned(session.scene.origin_world);
+    let mut volume = probes.volume_as_planned(session.scene.origin_world);
+    if probes.query.weights.glossy.asks_levels() {
+        volume.radiance.make_levels();
+    }
     let truth = args.bake_error.then(|| truth(args, &session, &world, &probes, &volume));
     let settings = &probes.query.weights;
     let shown = Shown {
@@ -135,7 +150,7 @@ fn run_export(args: &RenderArgs, reference: Option<Source>, console: &Console) -
         environment: record.environment.as_deref(),
         allow_change: args.allow_scene_change,
     };
-    let session = Session::open(opening(args, record.light, origin), console)?;
+    let session = Session::open(opening(args, record.light, origin, Detail::PICTURE), console)?;
     let (world, accel_build_s) = session.world()?;
     let cameras = prepare(args, &session, &world)?;
     let written = written.relative_to(session.scene.origin_world);
@@ -189,13 +204,13 @@ fn finish<A: Answers>(run: &Run<A>, cameras: &[Camera]) -> Result<()> {
     }
 }
 
-fn opening<'a>(args: &'a RenderArgs, light: LightRecord, probes: Probes<'a>) -> Opening<'a> {
+fn opening<'a>(args: &'a RenderArgs, light: LightRecord, probes: Probes<'a>, detail: Detail) -> Opening<'a> {
     Opening {
         scene: &args.scene,
         trace: &args.trace,
         light,
         probes: Some(probes),
-        detail: Detail::PICTURE,
+        detail,
         keep_images: false,
         inputs: vec![Named::new("the probe file", &args.probes)],
         // Each camera has pictures of its own, in a folder of its own.
@@ -256,6 +271,7 @@ fn render_camera<A: Answers>(run: &Run<A>, camera: &Camera, folder: &Path) -> Re
     });
     let of_engine =
         |(to, written, bytes): &(Target, Written, f64)| scenery.shade_as(written, to.method(), &air, *bytes);
+    let mut by_rays = scenery.shade_diffuse_rays(query, &masks, &shaded[1]);
     let mut as_engine = probes.also.as_ref().map(of_engine);
     let fitted = probes.is_fitted;
     let baked = run.truth.as_ref().filter(|_| !fitted).map(|t| t.report.clone());
@@ -266,8 +282,9 @@ fn render_camera<A: Answers>(run: &Run<A>, camera: &Camera, folder: &Path) -> Re
     let shot = Shot { session, world: run.world, camera, view: &view };
     let reference = Reference::obtain(run.reference.as_ref(), shot, args.allow_scene_change)?;
     let exposure_ev = args.exposure.unwrap_or_else(|| exposure(&shaded[2], reference.as_ref()));
+    scenery.shade_glossy(query, &masks, &mut shaded, reference.as_ref().and_then(Reference::glossy_layers));
     if let Some(reference) = &reference {
-        let all = shaded.iter_mut().chain(&mut path_traced).chain(&mut as_engine);
+        let all = shaded.iter_mut().chain(&mut path_traced).chain(&mut by_rays).chain(&mut as_engine);
         compare(session, reference, exposure_ev, all);
     }
     if let Some(spp) = args.reference {
@@ -275,7 +292,9 @@ fn render_camera<A: Answers>(run: &Run<A>, camera: &Camera, folder: &Path) -> Re
         let all = shaded.iter_mut().chain(&mut path_traced).chain(&mut as_engine);
         all.for_each(|shaded| shaded.compare_in_air(&air, &truth));
     }
+    warn_about(&camera.name, exposure_ev, &shaded[1].report, args, session.console);
     create_folder(folder)?;
+    remove_stale(args, folder)?;
     let shown = (&shaded, as_engine.as_ref());
     pictures::write(volume, (camera, &view), shown, reference.as_ref(), exposure_ev, folder)?;
     let report = RenderReport {
@@ -302,12 +321,33 @@ fn render_camera<A: Answers>(run: &Run<A>, camera: &Camera, folder: &Path) -> Re
         fitted,
         baked_reason: (fitted && run.truth.is_some()).then_some(baked::FITTED),
         export: probes.export.map(Target::name),
-        methods: shaded.into_iter().chain(path_traced).chain(as_engine).map(|s| s.report).collect(),
+        methods: shaded.into_iter().chain(path_traced).chain(by_rays).chain(as_engine).map(|s| s.report).collect(),
     };
-    write_json(&folder.join("report.json"), &report)?;
+    write_json(&folder.join(REPORT), &report)?;
     tell::rendered(session.console, &report);
-    pictures(args, folder).iter().for_each(|picture| tell::written(session.console, &picture.path));
+    let written = pictures(args, folder).into_iter().filter(|picture| picture.path.exists());
+    written.for_each(|picture| tell::written(session.console, &picture.path));
     Ok(report)
+}
+
+/// Warns of a picture that shows next to no light, and of one that shows much that the probes do not reach.
+fn warn_about(camera: &str, exposure_ev: f32, on: &MethodReport, args: &RenderArgs, console: &Console) {
+    if args.exposure.is_none() && exposure_ev.abs() > EXTREME_EV {
+        let (what, remedy) = match exposure_ev > 0.0 {
+            true => ("hardly any light", "look from elsewhere (--camera, --look-at), or give a sky (--env)"),
+            false => ("very much light", "lights in lumens want --set lights.punctual_scale=0.001464 in the bake"),
+        };
+        console.warn(format!(
+            "camera {camera}: {what} reaches what it sees, the exposure is {exposure_ev:+.1} EV; {remedy}"
+        ));
+    }
+    if let Some(share) = on.outside_hull.filter(|share| *share > MUCH_OUTSIDE) {
+        console.warn(format!(
+            "camera {camera}: {} of what it sees lies outside the probes' hull, where the probes at its rim are used; bake \
+             with grid.bounds that hold it, or without",
+            format::percent(share)
+        ));
+    }
 }
 
 /// Adds the figures that need a reference.

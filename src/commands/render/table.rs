@@ -3,70 +3,85 @@
 use crate::evaluate::PATH_RAY;
 use crate::report::baked::BakedReport;
 use crate::report::error::{ErrorEstimate, ErrorReport};
-use crate::report::render::{MethodReport, RenderReport};
+use crate::report::render::{MethodReport, RenderReport, Timing};
 use crate::report::table::{Column, Table};
 use crate::shade::visibility_modes::VisibilityMode;
 use crate::system::format;
 
-/// One camera's table, and in words where the errors lie.
+/// What the first column and the lines below call the methods.
+const PROBES_BY_PATHS: &str = "path-traced probes";
+
+/// One row of the table: its name, and what it says of a method.
+type Row = (&'static str, fn(&MethodReport) -> String);
+
+/// Figures of every run.
+const ROWS: &[Row] = &[
+    ("shade", |m| format::seconds(m.shade_ms.median / 1e3)),
+    ("rays", |m| format::seconds(m.ray_ms / 1e3)),
+    ("look-up", |m| format::or_undefined(m.lookup_ns, |ns| format::seconds(ns / 1e9))),
+    ("look-up, of runs", |m| m.lookup_spread_ns.as_ref().map_or(format::UNDEFINED.to_owned(), spread)),
+    ("memory per probe", |m| format::bytes(m.bytes_per_probe.round() as u64)),
+    ("leak light", |m| percent(m.leak.light)),
+    ("leak dark", |m| percent(m.leak.dark)),
+    ("blocks", |m| percent(m.leak.blocks)),
+    ("hidden share", |m| percent(m.leak.fraction)),
+    ("outside the hull", |m| percent(m.outside_hull)),
+    ("irradiance", |m| {
+        format::or_undefined(m.irradiance_indirect_mean, |e| format!("{} W·m⁻²", format::significant(e, 4)))
+    }),
+    ("in the air: leak light", |m| percent(m.air.leak_light)),
+    ("in the air: leak dark", |m| percent(m.air.leak_dark)),
+    ("in the air: black", |m| percent(m.air.black)),
+];
+
+/// Figures that want a reference.
+const OF_REFERENCE: &[Row] = &[
+    ("error (nrmse)", |m| errors_of(m).map_or(format::UNDEFINED.to_owned(), |e| relative_rmse(&e.all))),
+    ("error in corners", |m| errors_of(m).map_or(format::UNDEFINED.to_owned(), |e| relative_rmse(&e.by_region.corner))),
+    ("error elsewhere", |m| errors_of(m).map_or(format::UNDEFINED.to_owned(), |e| relative_rmse(&e.by_region.flat))),
+    ("in the air: error", |m| {
+        let error = m.air.standard_error.error.map(|e| 100.0 * e);
+        format::or_undefined(m.air.error, |share| format!("{} %", format::with_error(100.0 * share, error)))
+    }),
+];
+
+fn percent(share: Option<f64>) -> String {
+    format::or_undefined(share, format::percent)
+}
+
+/// From the least to the most of the runs, ns.
+fn spread(timing: &Timing) -> String {
+    format!("{} to {} ns", format::significant(timing.min, 3), format::significant(timing.max, 3))
+}
+
+/// One camera's table, a row for each figure, and in words where the errors lie.
 pub fn table(report: &RenderReport) -> String {
-    let mut table = Table::new(&[
-        ("method", Column::Text),
-        ("visibility", Column::Text),
-        ("shade", Column::Number),
-        ("rays", Column::Number),
-        ("look-up", Column::Number),
-        ("memory per probe", Column::Number),
-        ("leak light", Column::Number),
-        ("leak dark", Column::Number),
-        ("blocks", Column::Number),
-        ("hidden share", Column::Number),
-        ("irradiance", Column::Number),
-        ("error (nrmse)", Column::Number),
-    ]);
-    let percent = |share: Option<f64>| share.map_or(format::UNDEFINED.to_owned(), format::percent);
-    let mean = report.reference.as_ref().and_then(|r| r.irradiance_indirect_mean);
-    for method in &report.methods {
-        let error = errors_of(method).map(|e| relative_rmse(&e.all));
-        table.push([
-            if method.name == PATH_RAY { "path-traced probes" } else { "probes" }.to_owned(),
-            column(report, method),
-            format::seconds(method.shade_ms.median / 1e3),
-            format::seconds(method.ray_ms / 1e3),
-            method.lookup_ns.map_or(format::UNDEFINED.to_owned(), |ns| format::seconds(ns / 1e9)),
-            format::bytes(method.bytes_per_probe.round() as u64),
-            percent(method.leak.light),
-            percent(method.leak.dark),
-            percent(method.leak.blocks),
-            percent(method.leak.fraction),
-            method.irradiance_indirect_mean.map_or(format::UNDEFINED.to_owned(), |e| format::significant(e, 4)),
-            error.unwrap_or_else(|| format::UNDEFINED.to_owned()),
-        ]);
+    let labels: Vec<&str> = report.methods.iter().map(|method| column(report, method)).collect();
+    let columns: Vec<(&str, Column)> =
+        [("visibility", Column::Text)].into_iter().chain(labels.iter().map(|l| (*l, Column::Number))).collect();
+    let mut table = Table::new(&columns);
+    let of_reference = OF_REFERENCE.iter().filter(|_| report.reference.is_some());
+    for (name, figure) in ROWS.iter().chain(of_reference) {
+        table.push([(*name).to_owned()].into_iter().chain(report.methods.iter().map(figure)));
     }
+    let unseen = report.methods.first().map_or(0.0, |m| m.leak.unseen);
     let mut text = format!(
         "camera {}, {}×{}, exposure {:+.2} EV, {} of the points see no probe\n{table}",
         report.camera,
         report.width,
         report.height,
         report.exposure_ev,
-        format::percent(report.methods.first().map_or(0.0, |m| m.leak.unseen)),
+        format::percent(unseen),
     );
-    text.extend(report.methods.iter().map(|method| format!("\n{}", air_line(method))));
+    let mean = report.reference.as_ref().and_then(|r| r.irradiance_indirect_mean);
+    let points = report.methods.first().map(|m| format!("in the air: at {} points of free air", m.air.points));
     let baked = report.baked.as_ref().filter(|b| b.figures.bias.is_some()).map(baked_line);
-    if report.fitted {
-        text.push_str(&match report.export {
-            None => format!(
-                "
-{UNFIT}: fitted values are right with the visibility that they were fitted with, so this row says nothing of \
-                 the method; bake with --preset physical to see what visibility does"
-            ),
-            Some(_) => "
-fitted to the engine's look-up: exact visibility, and leaks against it, say nothing of it"
-                .to_owned(),
-        });
-    }
+    let fitted = report.fitted.then(|| unfit_line(report));
     let reason = report.baked_reason.map(|reason| format!("no figure of the bake itself: {reason}"));
-    for line in error_lines(report, mean).into_iter().chain(baked).chain(reason) {
+    let gloss: Vec<String> = report.methods.iter().filter_map(glossy_line).collect();
+    let lines =
+        points.into_iter().chain(fitted).chain(gloss).chain(error_lines(report, mean)).chain(baked).chain(reason);
+    for line in lines {
         text.push('\n');
         text.push_str(&line);
     }
@@ -78,22 +93,30 @@ fn errors_of(method: &MethodReport) -> Option<&ErrorReport> {
     method.error.as_ref().or(method.error_gltf.as_ref())
 }
 
-fn visibility(method: &MethodReport) -> &'static str {
-    if method.name == PATH_RAY { "ray" } else { method.name.trim_start_matches("visibility_") }
+/// What the table says of the visibility of fitted probes where it is not that of the fit.
+const UNFIT: &str = "off (not fitted)";
+
+fn unfit_line(report: &RenderReport) -> String {
+    match report.export {
+        None => format!(
+            "{UNFIT}: fitted values are right with the visibility of their fit only; bake with --preset physical to see what \
+             visibility does"
+        ),
+        Some(_) => {
+            "fitted to the engine's look-up: exact visibility, and leaks against it, say nothing of it".to_owned()
+        }
+    }
 }
 
-/// What the table says of the visibility of fitted probes where it is not that of the fit.
-const UNFIT: &str = "off (not what was fitted)";
-
-/// A method's visibility in the table.
-fn column(report: &RenderReport, method: &MethodReport) -> String {
+/// A method's visibility as the head of its column.
+fn column(report: &RenderReport, method: &MethodReport) -> &'static str {
     let is_unfit = report.fitted && method.name == VisibilityMode::Off.name();
-    if is_unfit { UNFIT } else { visibility(method) }.to_owned()
+    if is_unfit { UNFIT } else { label(method) }
 }
 
 /// A method in a sentence.
 fn label(method: &MethodReport) -> &'static str {
-    if method.name == PATH_RAY { "path-traced probes" } else { visibility(method) }
+    if method.name == PATH_RAY { PROBES_BY_PATHS } else { method.name.trim_start_matches("visibility_") }
 }
 
 /// Root mean square error ÷ mean irradiance of the reference, with the standard error that its noise gives it. Where the reference is
@@ -107,10 +130,7 @@ fn relative_rmse(measured: &ErrorEstimate) -> String {
     }
 }
 
-/// Picks one region's figures.
-type Part = fn(&ErrorReport) -> &ErrorEstimate;
-
-/// What the error is relative to, each region's errors, and what speaks against relying on them.
+/// What the error is relative to, how large the regions are, and what speaks against relying on it.
 fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {
     let Some(reference) = &report.reference else { return Vec::new() };
     let errors: Vec<(&str, &ErrorReport)> =
@@ -120,44 +140,47 @@ fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {
     let transport = if glossy { " (glossy, as probes are not)" } else { "" };
     let difference = format!("error: root mean square difference from the reference{transport}");
     let mut lines = vec![match mean.filter(|mean| *mean > 0.0) {
-        Some(mean) => {
-            let noise = reference.standard_error_mean.map_or_else(String::new, |error| {
-                format!("; a pixel of it is known to {} on average", format::percent(error / mean))
-            });
-            format!("{difference} ÷ its mean, {} W·m⁻²{noise}", format::significant(mean, 4))
-        }
-        None => format!("{difference}, which is black"),
+        Some(mean) => format!("{difference} ÷ its mean, {} W·m⁻²", format::significant(mean, 4)),
+        None => format!("{difference}, which is black: no light reaches what this camera sees"),
     }];
-    let regions: [(&str, Part); 2] = [("in corners", |e| &e.by_region.corner), ("elsewhere", |e| &e.by_region.flat)];
-    for (name, region) in regions {
-        let pixels = region(first).pixels;
-        if pixels == 0 {
-            continue;
-        }
-        let share = format::percent(pixels as f64 / first.all.pixels.max(1) as f64);
-        let figures: Vec<String> =
-            errors.iter().map(|(visibility, e)| format!("{visibility} {}", relative_rmse(region(e)))).collect();
-        lines.push(format!("  {name} ({share} of the picture's surfaces): {}", figures.join(", ")));
+    if let (Some(mean), Some(error)) = (mean.filter(|mean| *mean > 0.0), reference.standard_error_mean) {
+        lines.push(format!("a pixel of the reference is known to {} on average", format::percent(error / mean)));
     }
+    let share = first.by_region.corner.pixels as f64 / first.all.pixels.max(1) as f64;
+    lines.push(format!("corners are {} of the picture's surfaces", format::percent(share)));
     lines.extend(verdicts(&errors));
     lines
 }
 
-/// What moving objects get.
-fn air_line(method: &MethodReport) -> String {
-    let air = &method.air;
-    let percent = |share: Option<f64>| share.map_or(format::UNDEFINED.to_owned(), format::percent);
-    let error = air.error.map_or_else(String::new, |error| {
-        format!("error {} %, ", format::with_error(100.0 * error, air.standard_error.error.map(|e| 100.0 * e)))
+/// What a method's gloss costs and how far it is off; `None` where it has none.
+fn glossy_line(method: &MethodReport) -> Option<String> {
+    let glossy = method.glossy.as_ref()?;
+    let error = glossy.error_gltf.as_ref().map_or_else(String::new, |error| {
+        let parts: Vec<String> = glossy
+            .parts
+            .iter()
+            .map(|part| format!("{} {}", part.name.replace('_', " "), relative_rmse(&part.error_gltf.all)))
+            .collect();
+        let parts = if parts.is_empty() { String::new() } else { format!(" ({})", parts.join(", ")) };
+        format!(", error_gltf {}{parts}", relative_rmse(&error.all))
     });
-    format!(
-        "{} in the air ({} points): {error}leak light {}, leak dark {}, black {}",
+    let traced = glossy.traced.map_or_else(String::new, |traced| {
+        format!(
+            ", {} probes and {} map reads a ray, {} of the rays lost",
+            format::significant(traced.probes, 3),
+            format::significant(traced.reads, 3),
+            format::percent(traced.lost)
+        )
+    });
+    Some(format!(
+        "{} glossy: {} in {}, {} a probe{traced}{error}",
         label(method),
-        air.points,
-        percent(air.leak_light),
-        percent(air.leak_dark),
-        percent(air.black)
-    )
+        glossy
+            .radiance_mean
+            .map_or(format::UNDEFINED.to_owned(), |l| format!("{} W·m⁻²·sr⁻¹", format::significant(l, 4))),
+        format::seconds(glossy.shade_ms.median / 1e3),
+        format::bytes(glossy.bytes_per_probe.round() as u64),
+    ))
 }
 
 /// What is wrong with the probes themselves.
@@ -174,7 +197,6 @@ fn baked_line(baked: &BakedReport) -> String {
         percent(figures.dark, standard_error.dark),
     )
 }
-
 /// Each verdict once, with the methods and regions that it is about.
 fn verdicts(errors: &[(&str, &ErrorReport)]) -> Vec<String> {
     let mut found: Vec<(&str, Vec<String>)> = Vec::new();

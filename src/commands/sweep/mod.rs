@@ -2,6 +2,7 @@
 
 mod methods;
 mod outputs;
+mod page;
 mod reference;
 mod sheet;
 mod summary;
@@ -12,13 +13,15 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 
-use self::methods::{check_all, check_captures, configurations, ladders, shared, shift, wants_floors};
+use self::methods::{check_all, check_captures, configurations, ladders, shades_gloss, shared, shift, wants_floors};
 use self::work::Work;
 use super::camera::cameras;
 use super::session::{Opening, Session, list_presets, lists_presets};
 use super::{Console, check_picture_memory, tell};
 use crate::cli::SweepArgs;
 use crate::evaluate::{Comparison, Scenery};
+use crate::light::bsdf::ReflectionModel;
+use crate::plan::glossy_materials;
 use crate::report::sweep::SweepTimes;
 use crate::scene::Detail;
 use crate::shade::points::see;
@@ -26,9 +29,9 @@ use crate::shade::reference::ReferenceSettings;
 use crate::shade::regions::regions;
 use crate::sweep::ladder::LadderFile;
 use crate::sweep::run::{Setting, Truths};
-use crate::sweep::store::Store;
-use crate::system::format;
+use crate::sweep::store::{self, Store};
 use crate::system::output::{Named, check_folder, create_folder};
+use crate::system::{format, interrupt};
 
 /// Memory that evaluation takes at its peak, per pixel: as a render's with a reference, and the sums over the seeds.
 const PIXEL_BYTES: f64 = 1500.0;
@@ -50,7 +53,7 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
         trace: &args.trace,
         light: config.light(),
         probes: None,
-        detail: Detail::PICTURE,
+        detail: if shades_gloss(&ladders) { Detail::GLOSSY } else { Detail::PICTURE },
         keep_images,
         inputs: configurations(args, file.as_ref()),
         // In a folder that does not exist nothing is in the way.
@@ -69,6 +72,9 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
     create_folder(&args.output)?;
     let settings = ReferenceSettings { spp: args.reference, seed: session.seed, ..Default::default() };
     let reference = reference::obtain(args, &world, &camera, &settings, console)?;
+    let has_gloss = shades_gloss(&ladders) && glossy_materials(world.scene) > 0;
+    let gltf = ReferenceSettings { transport: ReflectionModel::Gltf, ..settings };
+    let glossy = has_gloss.then(|| reference::obtain(args, &world, &camera, &gltf, console)).transpose()?;
     let primary_started = Instant::now();
     let view = see(&world, &camera, args.view.size.width, args.view.size.height, session.seed);
     let primary_s = primary_started.elapsed().as_secs_f64();
@@ -85,6 +91,7 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
             exposure_ev,
             seed: session.seed,
         },
+        glossy: glossy.as_ref().and_then(|reference| reference.glossy.as_ref()),
         reference_mean: mean.filter(|mean| *mean > 0.0),
         reference_settings: ReferenceSettings { spp: reference.spp, ..settings },
         store: Store::new(&args.output)?,
@@ -92,12 +99,14 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
         // Times depend on the threads.
         identity: format!("{}spp = {}\nthreads = {}\n", reference.identity.to_text(), reference.spp, session.threads),
     };
+    interrupt::leaves(args.output.join(store::FOLDER), "the same command goes on from there", true);
     let wants_floors = wants_floors(args, file.as_ref());
     let mut work = Work::new(&setting, &ladders, args, wants_floors, console);
     let outcomes = work.run_all()?;
     let sets = summary::ladders(&ladders, &outcomes);
     let floor = if wants_floors { work.floors(&sets, &outcomes)? } else { Vec::new() };
     let shown = work.shown(&sets, &outcomes)?;
+    let irradiance = work.irradiance(&outcomes)?;
     work.bar.finish_and_clear();
 
     let report = summary::report(summary::Parts {
@@ -110,7 +119,7 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
         times: SweepTimes {
             load: session.load_s,
             accel_build: accel_build_s,
-            reference: reference.time_s.unwrap_or(0.0),
+            reference: reference.time_s.unwrap_or(0.0) + glossy.as_ref().and_then(|r| r.time_s).unwrap_or(0.0),
             total: session.elapsed_s(),
         },
         offsets,
@@ -121,7 +130,9 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
     outputs::write(&report, &args.output)?;
     let contact = sheet::draw(&report, &setting.scenery, &reference.layers, &regions, &shown);
     contact.write_png(&args.output.join(sheet::FILE))?;
-    outputs.iter().for_each(|output| tell::written(console, &output.path));
+    let seen = page::Seen { scenery: &setting.scenery, reference: &reference.layers, regions: &regions, exposure_ev };
+    page::write(&report, &seen, &irradiance, &args.output)?;
+    outputs.iter().filter(|o| o.path.exists()).for_each(|output| tell::written(console, &output.path));
     let kept = format::counted(work.kept as u64, "run", "runs");
     let from_before = if work.kept > 0 { format!(", {kept} kept from before") } else { String::new() };
     session.print(&report, || format!("{}\nwrote {}{from_before}", table::text(&report), args.output.display()))

@@ -1,5 +1,7 @@
 //! The bakes of a sweep, one after the other: each has all threads.
 
+use glam::Vec3;
+
 use super::sheet::Shown;
 use super::summary::Outcome;
 use crate::cli::SweepArgs;
@@ -78,6 +80,16 @@ impl<'a, 's> Work<'a, 's> {
             all.push(Shown { configuration, irradiance });
         }
         Ok(all)
+    }
+
+    /// What each configuration shows, per pixel, W·m⁻²: its first run, which is kept by now.
+    pub fn irradiance(&self, outcomes: &[Outcome]) -> Result<Vec<Vec<Vec3>>, SweepError> {
+        let seed = self.seeds.first().copied().unwrap_or_default();
+        let first = |outcome: &Outcome| {
+            let warn = |what: String| self.console.warn(what);
+            Ok(self.setting.obtain(&outcome.report.label, &outcome.config, seed, warn)?.irradiance)
+        };
+        outcomes.iter().map(first).collect()
     }
 
     /// What limits each ladder's best configuration.

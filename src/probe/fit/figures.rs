@@ -19,8 +19,8 @@ pub struct FitFigures {
     pub rows_held_out: usize,
     /// Points without a row, because what is stored gives too much weight to hidden probes there, or knows none.
     pub rows_dropped: usize,
-    /// From each point.
-    pub paths: u32,
+    /// From each of them, mean.
+    pub paths: f64,
     /// Of the solver.
     pub iterations: u32,
     /// RMSE at the held-out points of surfaces, with their own normals, those without a row included.

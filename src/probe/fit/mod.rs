@@ -35,6 +35,10 @@ use crate::probe::store::irradiance::Factors;
 /// Times that unknowns below 0 are held there and the others solved for again, where none may be negative.
 pub const ROUNDS: u32 = 3;
 
+/// What is left of a probe's mean at least, as a share of what it was before the fit: floors under negative sums are shares of
+/// it, and none is to be black.
+const LEAST_MEAN: f64 = 0.005;
+
 /// A look-up whose values are fitted. They are the prior too: unknowns that no row asks for keep their values.
 pub trait Fitted: Sync {
     fn look_up(&self) -> impl Answers;
@@ -104,7 +108,7 @@ pub fn run_on(
         rows: chosen.len(),
         rows_held_out: count(|a| a.is_held_out),
         rows_dropped: count(|a| !a.is_fitted),
-        paths: settings.paths,
+        paths: chosen.iter().map(|&i| f64::from(targets[i].paths)).sum::<f64>() / chosen.len().max(1) as f64,
         iterations,
         held_out_before: before.surface,
         held_out_after: after.surface,
@@ -127,9 +131,14 @@ pub fn fit_rows(volume: &mut Volume, rows: impl Iterator<Item = Row>, settings: 
     let prior: Vec<Vec3A> = (0..volume.states.len()).flat_map(|p| volume.irradiance.fitted(p)).collect();
     let lambda = firmness(&rows, &factors, &prior, settings.lambda);
     let task = solve::Task { rows: &rows, prior: &prior, lambda, iterations: settings.iterations };
-    // Irradiance is nowhere negative; coefficients have signs.
-    let bounded = volume.irradiance.signed().is_none();
-    let solved = task.solve(if bounded { ROUNDS } else { 0 });
+    // Irradiance is nowhere negative. Coefficients have signs, but for the mean of all directions.
+    let solved = match volume.irradiance.signed() {
+        None => task.solve(ROUNDS),
+        Some(_) => task.solve_above(ROUNDS, |i| match i % unknowns {
+            0 => prior[i].as_dvec3() * LEAST_MEAN,
+            _ => DVec3::NEG_INFINITY,
+        }),
+    };
     let asked = rows.asked();
     for (p, values) in solved.values.chunks(unknowns).enumerate().filter(|(p, _)| asked[*p]) {
         volume.irradiance.set_fitted(p, values);

@@ -37,6 +37,11 @@ impl Task<'_, '_, '_> {
     /// Solves. Up to `rounds` times values below 0 are held at 0 and the others solved for again; without rounds values may
     /// be negative.
     pub fn solve(&self, rounds: u32) -> Solved {
+        self.solve_above(rounds, |_| DVec3::ZERO)
+    }
+
+    /// The same with a bound of its own for each unknown.
+    pub fn solve_above(&self, rounds: u32, least: impl Fn(usize) -> DVec3) -> Solved {
         let prior: Vec<DVec3> = self.prior.iter().map(|x| x.as_dvec3()).collect();
         let diagonal = self.rows.diagonal();
         let normal = Normal::new(self.rows);
@@ -50,10 +55,11 @@ impl Task<'_, '_, '_> {
                 break;
             }
             let mut held = false;
-            for ((beyond, free), prior) in beyond.iter_mut().zip(&mut free).zip(&prior) {
+            for (i, ((beyond, free), prior)) in beyond.iter_mut().zip(&mut free).zip(&prior).enumerate() {
+                let bound = least(i) - *prior;
                 for channel in 0..3 {
-                    if free[channel] > 0.0 && beyond[channel] + prior[channel] < 0.0 {
-                        (beyond[channel], free[channel]) = (-prior[channel], 0.0);
+                    if free[channel] > 0.0 && beyond[channel] < bound[channel] {
+                        (beyond[channel], free[channel]) = (bound[channel], 0.0);
                         held = true;
                     }
                 }
@@ -62,11 +68,11 @@ impl Task<'_, '_, '_> {
                 break;
             }
         }
-        let value = |(beyond, prior): (&DVec3, &DVec3)| {
-            let value = *beyond + *prior;
-            Vec3A::from((if rounds > 0 { value.max(DVec3::ZERO) } else { value }).as_vec3())
+        let value = |i: usize| {
+            let value = beyond[i] + prior[i];
+            Vec3A::from((if rounds > 0 { value.max(least(i)) } else { value }).as_vec3())
         };
-        Solved { values: beyond.iter().zip(&prior).map(value).collect(), iterations }
+        Solved { values: (0..prior.len()).map(value).collect(), iterations }
     }
 
     /// Conjugate gradients from `beyond` on, over the values that are free. Returns the iterations.

@@ -309,8 +309,10 @@ fn held_out_points_of_each_kind_have_figures_of_their_own() {
             ..asked_in_air(inside(&volume, &mut random).position, Vec3::Y)
         };
         let asked: Vec<Asked> = points.iter().map(ask).collect();
-        let targets: Vec<_> =
-            points.iter().map(|(.., runs)| targets::Target { runs: runs.map(Vec3::splat), noise: 0.0 }).collect();
+        let targets: Vec<_> = points
+            .iter()
+            .map(|(.., runs)| targets::Target { runs: runs.map(Vec3::splat), noise: 0.0, paths: 16 })
+            .collect();
         figures::residuals(&query, &asked, &targets)
     };
     let surface = [(Kind::Surface, true, [1.0, 1.0]), (Kind::Surface, true, [3.0, 3.0])];

@@ -1,5 +1,6 @@
 //! Where probes are and which of them count: the grid, and each probe's state.
 
+pub mod content;
 pub mod crossings;
 pub mod grid;
 mod refine;
@@ -11,4 +12,5 @@ pub mod tree;
 
 pub use self::grid::{Grid, ProbeIndex};
 pub use self::refine::Refine;
+pub use self::settings::Automatic;
 pub use self::state::ProbeState;

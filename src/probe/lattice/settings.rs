@@ -3,10 +3,14 @@
 use glam::{DVec3, UVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
+use super::content::content_bounds;
 use crate::scene::Scene;
 
 /// Cells along the longest side of the bounds where neither spacing nor divisions are given.
 const DEFAULT_CELLS: f64 = 16.0;
+
+/// Most probes of a grid whose spacing follows the content of a scene that is much larger.
+const MOST_BY_CONTENT: f64 = 16_384.0;
 
 /// More probes than this are taken for a slip of the spacing.
 pub const MAX_PROBES: u64 = 1 << 26;
@@ -63,6 +67,17 @@ fn in_words(count: f64) -> String {
     if count < 1e9 { count.to_string() } else { format!("about {count:.0e}") }
 }
 
+/// A spacing that was chosen for the user.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Automatic {
+    /// Metres.
+    pub spacing: f64,
+    /// Longest side of the scene's box, metres.
+    pub scene: f64,
+    /// Longest side of what it follows, metres, where that is much smaller than the scene.
+    pub content: Option<f64>,
+}
+
 /// Finest points along each axis, where the first lies, relative to the scene's origin, and how far they are apart, metres.
 pub(super) struct Layout {
     pub origin: DVec3,
@@ -77,6 +92,45 @@ impl GridSettings {
     /// They make no grid.
     pub fn spacing_in(&self, scene: &Scene) -> Result<f64, GridError> {
         Ok(self.layout(scene, 1)?.spacing.max_element())
+    }
+
+    /// The box that the probes are to cover, without padding, world space, metres.
+    pub fn bounds_in(&self, scene: &Scene) -> (DVec3, DVec3) {
+        match self.bounds {
+            Some(bounds) => (DVec3::from(bounds.min), DVec3::from(bounds.max)),
+            None => {
+                let (low, high) = scene_bounds(scene);
+                (low + scene.origin_world, high + scene.origin_world)
+            }
+        }
+    }
+
+    /// The spacing that is chosen where these settings leave it open; `None` where they do not.
+    pub fn automatic(&self, scene: &Scene) -> Option<Automatic> {
+        if self.spacing_m.is_some() || self.divisions.is_some() {
+            return None;
+        }
+        if let Some(Bounds { min, max }) = self.bounds {
+            let longest = (DVec3::from(max) - DVec3::from(min)).max_element();
+            return Some(Automatic { spacing: longest / DEFAULT_CELLS, scene: longest, content: None });
+        }
+        let (low, high) = scene_bounds(scene);
+        let (extent, longest) = (high - low, (high - low).max_element());
+        let usual = longest / DEFAULT_CELLS;
+        let content = content_bounds(&scene.mesh).map(|(low, high)| f64::from((high - low).max_element()));
+        let Some(content) = content.filter(|content| *content > 0.0) else {
+            return Some(Automatic { spacing: usual, scene: longest, content: None });
+        };
+        // A few per cent at a time, so that the grid is nearly as fine as it may be.
+        let too_many = |spacing: f64| {
+            let probes = cover(extent, spacing, self.padding).map(|(_, points)| points.as_dvec3().element_product());
+            !probes.is_ok_and(|probes| probes <= MOST_BY_CONTENT)
+        };
+        let mut spacing = content / DEFAULT_CELLS;
+        while spacing < usual && too_many(spacing) {
+            spacing *= 1.05;
+        }
+        Some(Automatic { spacing: spacing.min(usual), scene: longest, content: Some(content) })
     }
 
     /// The points that these settings ask for, `whole` or a multiple of it along each axis.
@@ -115,7 +169,9 @@ impl GridSettings {
                 cover(high - low, spacing, padding)?
             }
             (None, None) => {
-                let spacing = (high - low).max_element() / DEFAULT_CELLS;
+                let usual = (high - low).max_element() / DEFAULT_CELLS;
+                let automatic = if self.bounds.is_some() { None } else { self.automatic(scene) };
+                let spacing = automatic.map_or(usual, |automatic| automatic.spacing);
                 cover(high - low, spacing, padding)?
             }
         };

@@ -16,6 +16,7 @@ mod stage;
 pub mod survey;
 #[cfg(test)]
 mod tests;
+mod walls;
 
 pub use self::ddgi::DdgiSettings;
 pub use self::placement::{Placement, PlacementTask};

@@ -5,6 +5,7 @@ use super::placement::{Placement, PlacementTask};
 use super::settings::PlacementRule;
 use super::settle::{Settler, settle_all};
 use super::survey::Surveyor;
+use super::walls::walls;
 use super::{air, need};
 use crate::light::World;
 use crate::probe::lattice::{Grid, ProbeState};
@@ -37,7 +38,7 @@ pub fn place(world: &World, task: &PlacementTask, surveying: impl FnOnce()) -> P
         leave_unseen(&world.scene.mesh, grid, &mut placement, &found.table, settings.keep_unsampled);
         let (seen, rays) = air::seen(world, grid, &placement, &found.table);
         placement.rays += rays + lend(world, grid, &mut found, &seen);
-        placement.regions = Some(Regions::new(grid, &found.table, &found.ranks(), &seen));
+        placement.regions = Some(Regions::new(grid, &found.table, &found.ranks(), &seen, &walls(&surveyor, &found)));
     }
     placement.survey = Some(found.table);
     placement

@@ -68,13 +68,13 @@ impl Survey {
 
 /// A triangle in one voxel. Small, for there are millions and they are sorted.
 #[derive(Debug, Clone, Copy)]
-struct Met {
-    cell: CellIndex,
-    triangle: u32,
+pub struct Met {
+    pub cell: CellIndex,
+    pub triangle: u32,
     /// Of the voxel with [`Facing::ALL`]'s first facing.
-    voxel_key: u16,
+    pub voxel_key: u16,
     /// Of the front.
-    facing: Facing,
+    pub facing: Facing,
 }
 
 impl Met {
@@ -133,12 +133,13 @@ struct Found {
 
 /// The surfaces in every voxel of a grid.
 pub struct Surveyor<'a, 's> {
-    world: &'a World<'s>,
-    grid: &'a Grid,
-    n: u32,
+    pub world: &'a World<'s>,
+    pub grid: &'a Grid,
+    /// Voxels along each axis of a cell.
+    pub n: u32,
     pub settings: &'a SurveySettings,
     /// By cell, voxel and triangle.
-    met: Vec<Met>,
+    pub met: Vec<Met>,
 }
 
 impl<'a, 's> Surveyor<'a, 's> {
@@ -154,7 +155,7 @@ impl<'a, 's> Surveyor<'a, 's> {
         surveyor
     }
 
-    fn mesh(&self) -> &'a Mesh {
+    pub fn mesh(&self) -> &'a Mesh {
         &self.world.scene.mesh
     }
 
@@ -203,7 +204,7 @@ impl<'a, 's> Surveyor<'a, 's> {
     }
 
     /// A position in units of a cell's voxels.
-    fn in_voxels(&self, cell: CellIndex, position: Vec3) -> Vec3 {
+    pub fn in_voxels(&self, cell: CellIndex, position: Vec3) -> Vec3 {
         self.grid.cell_from_scene(cell, position) * self.n as f32
     }
 

@@ -1,5 +1,6 @@
 //! Irradiance as probes hold it: the settings, the values in memory, and the linear unknowns that the solver works on.
 
+mod bound;
 mod factors;
 mod settings;
 

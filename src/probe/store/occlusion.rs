@@ -1,5 +1,6 @@
 //! What probes know about occlusion: the settings, and the data that a look-up asks.
 
+mod bound;
 mod settings;
 
 use std::borrow::Cow;

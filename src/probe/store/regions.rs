@@ -8,7 +8,8 @@
 //! Storage: u16 words, `roots[c]` the first of cell c's tree; cells with the same tree share it. A word below 2¹⁵ divides:
 //! bits 13–14 axis (x, y, z, facing), bits 8–12 threshold t, bits 0–7 how many words farther on the part at and beyond t
 //! begins. The part below t follows. Where 8 bits are too few they are 0, and two words with the distance (low, high) come
-//! between. A word with bit 15 ends: bits 0–7 mask. Where the mask is 0 and bit 14 is set, two words follow, low and high, of
+//! between. Thresholds of facings from 8 on are thin walls across x, y and z (8, 9, 10), and the word that follows is where:
+//! 2¹⁶ times the share of the cell's side. Points on such a wall, within 1/1024 of the side, go by the way that they face. A word with bit 15 ends: bits 0–7 mask. Where the mask is 0 and bit 14 is set, two words follow, low and high, of
 //! the number of a probe farther away that the surface sees.
 
 mod grow;
@@ -18,12 +19,13 @@ mod words;
 
 use std::collections::HashMap;
 
-use glam::{UVec3, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 use safetensors::Dtype;
 
-pub use self::grow::{Rank, air_places};
-use self::words::{AXIS_SHIFT, FAR, LEAF, LOW, NUMBER, Part, THRESHOLD_SHIFT, distance, length, number};
+pub use self::grow::{BELOW, BEYOND, Rank, Wall, air_places};
+use self::words::{FACINGS, FAR, LEAF, LOW, Part, WALLS, distance, length, number, plane_of};
+pub use self::words::{MOST_WALLS, Plane};
 use super::surface::{Facing, MAX_VOXELS_PER_CELL, Seen, SurfaceVisibility, voxel_of};
 use crate::probe::container::Container;
 use crate::probe::lattice::grid::{Cell, CellIndex, Grid, ProbeIndex};
@@ -38,12 +40,21 @@ pub struct Regions {
 
 impl Regions {
     /// The trees of a table. Entries answer as they do there, according to their `ranks`. The air answers about as `air` says: what
-    /// the [`air_places`] of each cell see, or nothing where that is not known.
-    pub fn new(grid: &Grid, table: &SurfaceVisibility, ranks: &[Rank], air: &[Vec<u8>]) -> Regions {
+    /// the [`air_places`] of each cell see, or nothing where that is not known. `walls` are those of each cell, or none.
+    pub fn new(
+        grid: &Grid,
+        table: &SurfaceVisibility,
+        ranks: &[Rank],
+        air: &[Vec<u8>],
+        walls: &[Vec<Wall>],
+    ) -> Regions {
         let air = |cell: u32| air.get(cell as usize).map_or(&[][..], Vec::as_slice);
+        let walls = |cell: u32| walls.get(cell as usize).map_or(&[][..], Vec::as_slice);
         let trees: Vec<Vec<u16>> = (0..grid.cell_count() as u32)
             .into_par_iter()
-            .map_init(grow::Grower::default, |grower, cell| grower.tree(table, CellIndex(cell), ranks, air(cell)))
+            .map_init(grow::Grower::default, |grower, cell| {
+                grower.tree(table, CellIndex(cell), ranks, air(cell), walls(cell))
+            })
             .collect();
         let (mut roots, mut words) = (Vec::with_capacity(trees.len()), Vec::new());
         let mut known: HashMap<Vec<u16>, u32> = HashMap::new();
@@ -63,13 +74,14 @@ impl Regions {
     #[inline]
     pub fn look_up(&self, grid: &Grid, cell: &Cell, at: Vec3, facing: Facing) -> Seen {
         let root = self.roots[grid.cell_index(cell).0 as usize] as usize;
-        let leaf = self.leaf(root, voxel_of(grid.fraction_in(cell, at), self.voxels_per_cell), facing);
+        let leaf = self.leaf(root, grid.fraction_in(cell, at), facing);
         Seen { mask: self.mask(leaf), far: self.far(leaf) }
     }
 
-    /// The word that ends at a voxel.
+    /// The word that ends at a point of a cell, in shares of its sides.
     #[inline]
-    fn leaf(&self, root: usize, voxel: UVec3, facing: Facing) -> usize {
+    fn leaf(&self, root: usize, point: Vec3, facing: Facing) -> usize {
+        let voxel = voxel_of(point, self.voxels_per_cell);
         let at = [voxel.x as u16, voxel.y as u16, voxel.z as u16, u16::from(facing.index())];
         let mut i = root;
         loop {
@@ -77,13 +89,14 @@ impl Regions {
             if word & LEAF != 0 {
                 return i;
             }
-            let is_below = at[usize::from(word >> AXIS_SHIFT)] < word >> THRESHOLD_SHIFT & 31;
-            i += match (usize::from(word & LOW), is_below) {
-                (0, true) => 1 + NUMBER,
-                (0, false) => number(&self.words[i + 1..]) as usize,
-                (_, true) => 1,
-                (distance, false) => distance,
+            let (axis, threshold) = plane_of(word);
+            let is_below = if axis == FACINGS && threshold >= WALLS {
+                let wall = Plane { axis: usize::from(threshold - WALLS), place: self.words[i + 1] };
+                wall.is_below(point, facing)
+            } else {
+                at[axis] < threshold
             };
+            i += if is_below { length(word) } else { distance(word, &self.words[i + 1..]) };
         }
     }
 
@@ -94,6 +107,11 @@ impl Regions {
 
     fn far(&self, leaf: usize) -> Option<ProbeIndex> {
         (self.words[leaf] & FAR != 0).then(|| ProbeIndex(number(&self.words[leaf + 1..])))
+    }
+
+    /// Roots and words, as the file has them.
+    pub fn numbers(&self) -> (&[u32], &[u16]) {
+        (&self.roots, &self.words)
     }
 
     /// Parts that all cells are divided into, shared ones once.
@@ -110,21 +128,25 @@ impl Regions {
     /// Mean number of probes seen, over all voxels and facings of all cells.
     pub fn mean_visible(&self) -> f64 {
         let whole = Part::whole(self.voxels_per_cell);
-        let mut known: HashMap<u32, u64> = HashMap::new();
-        let of_cell = |&root: &u32| *known.entry(root).or_insert_with(|| self.seen(root as usize, whole));
-        let seen: u64 = self.roots.iter().map(of_cell).sum();
-        seen as f64 / (self.roots.len() as u64 * whole.places()).max(1) as f64
+        let mut known: HashMap<u32, f64> = HashMap::new();
+        let of_cell = |&root: &u32| {
+            *known.entry(root).or_insert_with(|| {
+                let (seen, places) = self.seen(root as usize, whole);
+                seen as f64 / places.max(1) as f64
+            })
+        };
+        self.roots.iter().map(of_cell).sum::<f64>() / self.roots.len().max(1) as f64
     }
 
-    /// Number of probes seen, summed over the places of a part.
-    fn seen(&self, i: usize, part: Part) -> u64 {
-        let word = self.words[i];
+    /// Number of probes seen, summed over the places of a part, and these; those in a wall count on both sides.
+    fn seen(&self, i: usize, part: Part) -> (u64, u64) {
+        let (word, behind) = (self.words[i], &self.words[i + 1..]);
         if word & LEAF != 0 {
-            return part.places() * u64::from(self.mask(i).count_ones());
+            return (part.places() * u64::from(self.mask(i).count_ones()), part.places());
         }
-        part.divided(word).map_or(0, |[below, beyond]| {
-            let begins = i + distance(word, || number(&self.words[i + 1..]));
-            self.seen(i + length(word), below) + self.seen(begins, beyond)
+        part.divided(word, behind, self.voxels_per_cell).map_or((0, 0), |[below, beyond]| {
+            let sides = [self.seen(i + length(word), below), self.seen(i + distance(word, behind), beyond)];
+            (sides[0].0 + sides[1].0, sides[0].1 + sides[1].1)
         })
     }
 
@@ -190,8 +212,8 @@ fn firsts(words: &[u16], voxels_per_cell: u32, probes: usize) -> Result<Vec<u32>
         let end = i + length(word);
         let behind = words.get(i + 1..end).ok_or(i)?;
         if word & LEAF == 0 {
-            let [below, beyond] = part.divided(word).ok_or(i)?;
-            expected.push((i + distance(word, || number(behind)), beyond));
+            let [below, beyond] = part.divided(word, behind, voxels_per_cell).ok_or(i)?;
+            expected.push((i + distance(word, behind), beyond));
             part = below;
         } else {
             if !behind.is_empty() && (number(behind) as usize >= probes || word & LOW != 0) {

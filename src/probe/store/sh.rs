@@ -7,6 +7,7 @@
 //! With a gradient ([`gradient`]) a point beside the probe adds the change of the mean on its way there.
 
 mod gradient;
+mod numbers;
 
 use glam::{Vec2, Vec3, Vec3A};
 use rayon::prelude::*;

@@ -8,6 +8,7 @@ pub mod operator;
 pub mod rows;
 mod settings;
 pub mod solver;
+mod steps;
 #[cfg(test)]
 mod tests;
 mod tracing;

@@ -60,8 +60,8 @@ fn view(gate: &Gate) -> Value {
     context! {
         outcome => outcome(gate),
         title => gate.title(),
-        base => of_side(gate.base, gate.unit),
-        candidate => of_side(gate.candidate, gate.unit),
+        base => of_side(gate.base, gate.side_unit),
+        candidate => of_side(gate.candidate, gate.side_unit),
         value => value(gate) + &error,
         threshold => in_unit(gate.threshold, gate.unit),
         margin => margin(gate),

@@ -7,6 +7,7 @@ use serde::Deserialize;
 
 use super::figures::{Facts, Seeds, join};
 use crate::report::gate::Gate;
+use crate::report::words::unit_of;
 use crate::system::format;
 
 static RULES: LazyLock<Vec<Rule>> = LazyLock::new(|| {
@@ -145,7 +146,19 @@ impl Rule {
         }
         let item = join(item, &self.of.replace('*', label));
         let (name, unit) = (self.gate.clone(), self.unit.as_str());
-        let gate = Gate { name, item, base, candidate, value, unit, standard_error, explanation, ..Gate::default() };
+        let side_unit = unit_of(&place);
+        let gate = Gate {
+            name,
+            item,
+            base,
+            candidate,
+            value,
+            unit,
+            side_unit,
+            standard_error,
+            explanation,
+            ..Gate::default()
+        };
         Some(Finding {
             rule: self,
             gate,

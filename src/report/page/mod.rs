@@ -1,4 +1,5 @@
-//! The page of a comparison: one HTML file that holds its pictures, plots, style and script, and asks nothing of any network.
+//! Pages: one HTML file each that holds its pictures, plots, style and script, and asks nothing of any network. One is of a
+//! comparison, the other, [`look`], of a bake.
 //!
 //! A policy in its head (Content Security Policy, W3C, level 3) forbids every load but those of its own data, and every script but
 //! its own, which it knows by a number that no name from outside can foresee.
@@ -9,9 +10,10 @@ mod data;
 mod embed;
 mod histogram;
 mod images;
+pub mod look;
 mod pack;
 mod shrink;
-mod still;
+pub mod still;
 mod view;
 mod visible;
 
@@ -22,13 +24,16 @@ pub use data::{Command, ConfigChange, PageError, PairPixels};
 pub use embed::MOST_PIXELS;
 pub use histogram::histogram;
 pub use images::PackedImage;
+pub use shrink::PixelExtent;
 
 use crate::report::gate::Gate;
 
 const STYLE: &str = include_str!("../assets/page/page.css");
 const START: &str = include_str!("../assets/page/start.js");
-const SCRIPTS: [&str; 3] = [
+const THEME: &str = include_str!("../assets/page/theme.js");
+const SCRIPTS: [&str; 4] = [
     include_str!("../assets/page/codec.js"),
+    THEME,
     include_str!("../assets/page/viewer.js"),
     include_str!("../assets/page/page.js"),
 ];
@@ -42,12 +47,17 @@ const NO_NONCE: &str = "0";
 /// # Errors
 /// None in practice: the templates are part of the program.
 pub fn render(report: Value, gates: &[Gate], images: Vec<PackedImage>) -> Result<String, PageError> {
+    document("page.html", &view::view(report, gates, images), "", &SCRIPTS)
+}
+
+/// A template of what it reads as `page`, with its style besides that of all pages, and its scripts.
+fn document(template: &str, page: &Value, style: &str, scripts: &[&'static str]) -> Result<String, PageError> {
     let environment = view::environment()?;
-    let template = environment.get_template("page.html")?;
-    let view = view::view(report, gates, images);
+    let template = environment.get_template(template)?;
+    let (style, scripts) = (format!("{STYLE}{style}"), Value::from(scripts.to_vec()));
     let with_nonce = |nonce: &str| {
         template.render(
-            context! { page => view.clone(), style => STYLE, start => START, scripts => SCRIPTS, nonce => nonce },
+            context! { page => page.clone(), style => style.as_str(), start => START, scripts => scripts.clone(), nonce => nonce },
         )
     };
     // A name that is to pass for a script of ours would have to hold the hash of a page that holds that name.
@@ -72,6 +82,7 @@ mod tests {
             candidate: Some(1.0),
             value: Some(2.0),
             unit: "%",
+            side_unit: "",
             threshold: Some(1.0),
             margin: Some(-1.0),
             standard_error: Some(0.1),

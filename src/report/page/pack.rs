@@ -27,8 +27,16 @@ pub fn pack(planes: &[Vec<i16>], width: usize) -> io::Result<String> {
     for shift in [0, 8] {
         bytes.extend(residuals.iter().flatten().map(|residual| (residual >> shift) as u8));
     }
+    pack_bytes(&bytes)
+}
+
+/// Bytes as text.
+///
+/// # Errors
+/// None in practice: the writer is memory.
+pub fn pack_bytes(bytes: &[u8]) -> io::Result<String> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::new(EFFORT));
-    encoder.write_all(&bytes)?;
+    encoder.write_all(bytes)?;
     Ok(STANDARD.encode(encoder.finish()?))
 }
 

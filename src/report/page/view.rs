@@ -42,6 +42,7 @@ pub fn environment() -> Result<Environment<'static>, Error> {
     // The names' endings turn escaping on.
     environment.add_template("macros.html", include_str!("../assets/page/macros.html"))?;
     environment.add_template("page.html", include_str!("../assets/page/page.html"))?;
+    environment.add_template("look.html", include_str!("../assets/page/look/look.html"))?;
     Ok(environment)
 }
 
@@ -56,12 +57,13 @@ pub fn view(report: Value, gates: &[Gate], packed: Vec<PackedImage>) -> Value {
             ..Value::from(Serde(gate))
         }
     };
-    // From the low to the high end, RGB bytes.
-    let colors: Vec<u8> = (0..COLORS).flat_map(|i| color_at(i as f64 / (COLORS - 1) as f64)).collect();
+    let images = images(packed);
+    let worst = worst(gates, &images);
     context! {
         gates => gates.iter().map(gate).collect::<Vec<_>>(),
-        images => images(packed),
-        colors => STANDARD.encode(colors),
+        images,
+        worst,
+        colors => colors(),
         codes => context! {
             per_octave => codes::PER_OCTAVE,
             offset => codes::OFFSET,
@@ -71,6 +73,20 @@ pub fn view(report: Value, gates: &[Gate], packed: Vec<PackedImage>) -> Value {
         },
         ..report
     }
+}
+
+/// The place of the pair that the first gate about pictures is of: they come worst first. Without such a gate the first pair.
+fn worst(gates: &[Gate], images: &[Value]) -> usize {
+    let of_gate = |gate: &Gate| {
+        let is_of = |image: &Value| image.get_attr("name").is_ok_and(|name| name.as_str() == Some(&gate.item));
+        images.iter().position(is_of)
+    };
+    gates.iter().find_map(of_gate).unwrap_or(0)
+}
+
+/// The colours of heat maps from the low to the high end: RGB bytes, in base64.
+pub fn colors() -> String {
+    STANDARD.encode((0..COLORS).flat_map(|i| color_at(i as f64 / (COLORS - 1) as f64)).collect::<Vec<u8>>())
 }
 
 /// A threshold as somebody wrote it: without the zeros that make figures as long as each other.
@@ -84,7 +100,11 @@ fn threshold(value: Option<f64>, unit: &str) -> String {
 
 /// The figure of one side of a gate.
 fn of_side(value: Option<f64>, unit: &str) -> String {
-    if unit == words::BYTES { words::of_side(value, unit) } else { format::or_undefined(value, number) }
+    match unit {
+        "" => format::or_undefined(value, number),
+        words::BYTES => words::of_side(value, unit),
+        unit => format::or_undefined(value, |value| format!("{} {unit}", number(value))),
+    }
 }
 
 /// A pure number: what is whole is most likely counted, and shown without a fraction.

@@ -18,7 +18,7 @@ use crate::probe::query::{Query, Visibility};
 use crate::report::error::sampled;
 use crate::report::target::{NextReport, NoiseReport, SeenReport, StepReport, StoppedBecause, TargetReport};
 use crate::scene::Camera;
-use crate::shade::framing::frame;
+use crate::shade::framing::{USUAL_ASPECT, frame};
 use crate::shade::held_out::HeldOut;
 use crate::system::format;
 
@@ -217,7 +217,7 @@ impl Search<'_, '_> {
             }
         };
         let framed = match (world.scene.cameras.is_empty(), world.scene.mesh.bounds()) {
-            (true, Some(bounds)) => vec![frame(world, bounds).0],
+            (true, Some(bounds)) => vec![frame(world, bounds, USUAL_ASPECT).0],
             _ => Vec::new(),
         };
         Ok(framed.iter().chain(&world.scene.cameras).take(MOST_CAMERAS).enumerate().map(of_camera).collect())

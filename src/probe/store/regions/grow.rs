@@ -4,7 +4,7 @@
 use glam::{UVec3, Vec3};
 
 use super::super::surface::{Entry, Facing, SurfaceVisibility, voxel_of};
-use super::words::{AXIS_SHIFT, FAR, LEAF, LOW, NUMBER, THRESHOLD_SHIFT, words_of};
+use super::words::{AXIS_SHIFT, FAR, LEAF, LOW, NUMBER, Plane, THRESHOLD_SHIFT, words_of};
 use crate::probe::lattice::grid::CellIndex;
 
 /// What a part answers: a mask, or one of these.
@@ -25,6 +25,17 @@ pub enum Rank {
     Buried,
 }
 
+/// A thin wall in a cell, and on which sides of it each of the cell's entries lies: bit 0 below, bit 1 beyond.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wall {
+    pub plane: Plane,
+    pub sides: Vec<u8>,
+}
+
+/// Of [`Wall::sides`].
+pub const BELOW: u8 = 1;
+pub const BEYOND: u8 = 2;
+
 /// A place that a tree answers.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
@@ -33,6 +44,8 @@ struct Sample {
     answer: Answer,
     /// Whether a surface asks there: the answer has to be exact. In the air it may be wrong where that saves words.
     is_surface: bool,
+    /// By wall, on which sides it lies, two bits each.
+    sides: u8,
     /// Number of the answer among those of the part that is being divided.
     number: u32,
 }
@@ -63,46 +76,61 @@ pub fn air_places(voxels_per_cell: u32) -> impl Iterator<Item = Vec3> {
 /// Buffers that cells share.
 #[derive(Default)]
 pub struct Grower {
-    /// By key: whether a surface asks there.
-    is_known: Vec<bool>,
+    /// By key: where a surface asks, one more than its number in the cell; else 0.
+    known: Vec<u32>,
     samples: Vec<Sample>,
 }
 
 impl Grower {
     /// A cell's tree. `ranks` are those of all entries; `air` is what each of the cell's [`air_places`] sees, or empty.
-    pub fn tree(&mut self, table: &SurfaceVisibility, cell: CellIndex, ranks: &[Rank], air: &[u8]) -> Vec<u16> {
+    pub fn tree(
+        &mut self,
+        table: &SurfaceVisibility,
+        cell: CellIndex,
+        ranks: &[Rank],
+        air: &[u8],
+        walls: &[Wall],
+    ) -> Vec<u16> {
         let mut words = Vec::new();
-        if table.range(cell).is_empty() {
+        let range = table.range(cell);
+        if range.is_empty() {
             // Where no surface is known everything is seen.
             words.push(LEAF | LOW);
             return words;
         }
         let n = table.voxels_per_cell;
         self.samples.clear();
-        self.is_known.clear();
-        self.is_known.resize(n.pow(3) as usize * 6, false);
+        self.known.clear();
+        self.known.resize(n.pow(3) as usize * 6, 0);
+        let sides_of = |entry: usize| walls.iter().rev().fold(0, |sides, wall| sides << 2 | wall.sides[entry]);
         for entry in table.entries(cell) {
             let (facing, answer) = (Facing::of(entry.facing), answer(table, &entry));
             let rank = ranks[entry.index];
             if rank == Rank::Buried {
                 continue;
             }
-            self.is_known[Self::place(n, entry.voxel, facing)] = true;
-            self.add(entry.voxel, facing, answer, rank == Rank::Own);
+            let own = entry.index - range.start;
+            self.known[Self::place(n, entry.voxel, facing)] = own as u32 + 1;
+            self.add(entry.voxel, facing, answer, rank == Rank::Own, sides_of(own));
         }
         // Who sees none of the eight is inside of something, or cannot be helped.
         for (place, &mask) in air_places(n).zip(air).filter(|(_, mask)| **mask != 0) {
             let voxel = voxel_of(place, n);
             for facing in Facing::ALL {
-                if !self.is_known[Self::place(n, voxel, facing)] {
-                    self.add(voxel, facing, mask.into(), false);
+                let side = |wall: &Wall| if wall.plane.is_below(place, facing) { BELOW } else { BEYOND };
+                let sides = walls.iter().rev().fold(0, |sides, wall| sides << 2 | side(wall));
+                // On the other side of a wall a surface says nothing of the air.
+                let known = self.known[Self::place(n, voxel, facing)].checked_sub(1);
+                let is_here = known.is_some_and(|entry| meet(sides_of(entry as usize), sides, walls.len()));
+                if !is_here {
+                    self.add(voxel, facing, mask.into(), false, sides);
                 }
             }
         }
         if self.samples.is_empty() {
             words.push(LEAF);
         } else {
-            grow(&mut self.samples, &mut words);
+            grow_between(&mut self.samples, walls, 0, &mut words);
         }
         words
     }
@@ -111,9 +139,46 @@ impl Grower {
         ((voxel.x + n * (voxel.y + n * voxel.z)) * 6) as usize + usize::from(facing.index())
     }
 
-    fn add(&mut self, voxel: UVec3, facing: Facing, answer: Answer, is_surface: bool) {
+    fn add(&mut self, voxel: UVec3, facing: Facing, answer: Answer, is_surface: bool, sides: u8) {
         let at = [voxel.x as u8, voxel.y as u8, voxel.z as u8, facing.index()];
-        self.samples.push(Sample { at, answer, is_surface, number: 0 });
+        self.samples.push(Sample { at, answer, is_surface, sides, number: 0 });
+    }
+}
+
+/// Whether two things lie on a common side of every wall.
+fn meet(a: u8, b: u8, walls: usize) -> bool {
+    (0..walls).all(|wall| (a & b) >> (2 * wall) & 3 != 0)
+}
+
+/// Appends the tree of some samples, divided by the walls from the `first` on where these tell different answers apart.
+fn grow_between(samples: &mut [Sample], walls: &[Wall], first: usize, words: &mut Vec<u16>) {
+    let Some(wall) = walls.get(first) else {
+        grow(samples, words);
+        return;
+    };
+    let on = |side: u8| -> Vec<Sample> {
+        samples.iter().filter(|sample| sample.sides >> (2 * first) & side != 0).copied().collect()
+    };
+    let (mut below, mut beyond) = (on(BELOW), on(BEYOND));
+    if End::of(samples).is_some_and(|end| end.wrong == 0) || below.is_empty() || beyond.is_empty() {
+        grow_between(samples, walls, first + 1, words);
+        return;
+    }
+    let own = words.len();
+    words.extend(wall.plane.words());
+    grow_between(&mut below, walls, first + 1, words);
+    set_distance(words, own, wall.plane.words().len());
+    grow_between(&mut beyond, walls, first + 1, words);
+}
+
+/// Writes how far it is from the word at `own`, of a head of so many words, to the end.
+fn set_distance(words: &mut Vec<u16>, own: usize, head: usize) {
+    let distance = words.len() - own;
+    if distance <= usize::from(LOW) {
+        words[own] |= distance as u16;
+    } else {
+        let number = words_of((distance + NUMBER) as u32);
+        words.splice(own + head..own + head, number);
     }
 }
 
@@ -141,13 +206,7 @@ fn grow(samples: &mut [Sample], words: &mut Vec<u16>) -> u32 {
     let own = words.len();
     words.push((axis as u16) << AXIS_SHIFT | u16::from(threshold) << THRESHOLD_SHIFT);
     let mut wrong = grow(below, words);
-    let distance = words.len() - own;
-    if distance <= usize::from(LOW) {
-        words[own] |= distance as u16;
-    } else {
-        let number = words_of(distance as u32 + 2);
-        words.splice(own + 1..own + 1, number);
-    }
+    set_distance(words, own, 1);
     wrong += grow(beyond, words);
     let Some(end) = end else { return wrong };
     let saved = words.len() as u32 - own as u32 - end.words();

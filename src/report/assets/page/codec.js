@@ -77,5 +77,5 @@ const codec = (() => {
     return bytes;
   };
 
-  return { bytesOf, planes, radiance, difference, developed, isFinite, NAN };
+  return { bytesOf, inflate, planes, radiance, difference, developed, isFinite, NAN };
 })();

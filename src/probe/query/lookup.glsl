@@ -262,20 +262,30 @@ int facingOf(vec3 normal) {
 int seenBy(ivec3 base, vec3 position, vec3 geometric, out int far) {
   ivec3 n = cellsAlong();
   int i = int(texelFetch(roots, placeOf(base.x + n.x * (base.y + n.y * base.z)), 0).r);
-  ivec3 voxel = min(ivec3(fractionIn(base, position) * float(VOXELS)), ivec3(VOXELS - 1));
-  ivec4 at = ivec4(voxel, facingOf(geometric));
+  vec3 point = fractionIn(base, position);
+  int facing = facingOf(geometric);
+  ivec4 at = ivec4(min(ivec3(point * float(VOXELS)), ivec3(VOXELS - 1)), facing);
   far = -1;
-  // No path is longer than a cell has planes.
-  for (int steps = 0; steps < 3 * VOXELS + 6; steps++) {
+  // No path is longer than a cell has planes, and walls that may be on it.
+  for (int steps = 0; steps < 3 * VOXELS + 10; steps++) {
     uint word = wordAt(i);
     if ((word & 0x8000u) != 0u) {
       if ((word & 0x4000u) != 0u) far = numberAt(i + 1);
       return int(word & 0xffu);
     }
-    bool below = at[int(word >> 13)] < int((word >> 8) & 31u);
-    int way = int(word & 0xffu);
-    if (way == 0) i += below ? 3 : numberAt(i + 1);
-    else i += below ? 1 : way;
+    int axis = int(word >> 13), threshold = int((word >> 8) & 31u), way = int(word & 0xffu);
+    bool below = at[axis] < threshold;
+    int head = 1;
+    if (axis == 3 && threshold >= 8) {
+      // A thin wall, at a share of the cell's side; on it the facing tells.
+      int across = threshold - 8;
+      float beyond = point[across] - float(wordAt(i + 1)) / 65536.0;
+      bool onWall = abs(beyond) <= 1.0 / 1024.0 && facing / 2 == across;
+      below = onWall ? facing % 2 == 1 : beyond < 0.0;
+      head = 2;
+    }
+    if (way == 0) i += below ? head + 2 : numberAt(i + head);
+    else i += below ? head : way;
   }
   return 0;
 }

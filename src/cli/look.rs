@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::TraceArgs;
+use super::trace::TraceArgs;
 use super::values::parse_exposure;
 
 #[derive(Debug, Args)]

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{Chart, Charts, Place};
+use super::charts::{Chart, Charts, Place};
 use crate::light::World;
 use crate::light::contact::Contacts;
 use crate::light::lambert::reflected_radiance;

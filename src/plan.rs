@@ -52,7 +52,7 @@ impl Plan {
             sky(scene),
             alpha(scene),
             textures(scene),
-            glossy(scene, config),
+            glossy(scene, config, grid.probe_count()),
             unsampled(config, placement),
         ];
         // The survey knows nothing of surfaces beyond the probes' hull.
@@ -147,14 +147,28 @@ fn textures(scene: &Scene) -> Line {
 /// The stage of levels of radiance for glossy surfaces.
 const RADIANCE_LEVELS: &str = "radiance_levels";
 
-fn glossy(scene: &Scene, config: &Config) -> Line {
-    let glossy = scene.materials.iter().filter(|m| !m.unlit && (m.metallic > 0.0 || m.roughness < 1.0)).count();
+/// Materials of a scene that reflect more at some angles than at others.
+pub fn glossy_materials(scene: &Scene) -> usize {
+    scene.materials.iter().filter(|m| !m.unlit && (m.metallic > 0.0 || m.roughness < 1.0)).count()
+}
+
+fn glossy(scene: &Scene, config: &Config, probes: usize) -> Line {
     let levels = config.store.prefiltered.len();
-    match glossy {
-        0 => line(RADIANCE_LEVELS, false, "no glossy material"),
-        n if levels == 0 => {
+    match glossy_materials(scene) {
+        0 if levels == 0 => line(RADIANCE_LEVELS, false, "no glossy material"),
+        0 => {
+            let (_, per_probe) = config.store.radiance().runtime_bytes(0, false);
+            Line {
+                saved_bytes: Some((per_probe * probes) as u64),
+                ..line(RADIANCE_LEVELS, false, "no glossy material")
+            }
+        }
+        n if levels == 0 && config.query.glossy.is_none() => {
             let reason = format!("{n} glossy material(s), but the method stores irradiance only");
             line(RADIANCE_LEVELS, false, reason)
+        }
+        n if levels == 0 => {
+            line(RADIANCE_LEVELS, true, format!("{n} glossy material(s), shaded from the probes' light fields"))
         }
         n => line(RADIANCE_LEVELS, true, format!("{n} glossy material(s), {levels} level(s)")),
     }

@@ -152,7 +152,9 @@ impl Prepared<'_, '_> {
         // Times stay out of the file: the same input must give the same bytes.
         let lines: Vec<_> = plan.lines.iter().map(|l| Line { saved_s: None, ..l.clone() }).collect();
         let plan = serde_json::json!({ "visibility": plan.visibility, "lines": lines });
-        let (text, query) = (config.to_ron(), config.query_record());
+        let mut query = config.query_record();
+        query.weights.glossy = query.weights.glossy.resolved(config.grid.bounds_in(self.world.scene));
+        let text = config.to_ron();
         let border = config.store.border;
         let fit = fit.map(FitFigures::record);
         let provenance =

@@ -262,27 +262,28 @@ int facingOf(vec3 normal) {
 int seenBy(ivec3 base, vec3 position, vec3 geometric, out int far) {
   ivec3 n = cellsAlong();
   int i = int(texelFetch(roots, placeOf(base.x + n.x * (base.y + n.y * base.z)), 0).r);
-  vec3 point = fractionIn(base, position);
-  int facing = facingOf(geometric);
-  ivec4 at = ivec4(min(ivec3(point * float(VOXELS)), ivec3(VOXELS - 1)), facing);
+  vec3 fraction = fractionIn(base, position);
+  ivec3 voxel = min(ivec3(fraction * float(VOXELS)), ivec3(VOXELS - 1));
+  ivec4 at = ivec4(voxel, facingOf(geometric));
   far = -1;
-  // No path is longer than a cell has planes, and walls that may be on it.
+  // No path is longer than a cell has planes, and four walls.
   for (int steps = 0; steps < 3 * VOXELS + 10; steps++) {
     uint word = wordAt(i);
     if ((word & 0x8000u) != 0u) {
       if ((word & 0x4000u) != 0u) far = numberAt(i + 1);
       return int(word & 0xffu);
     }
-    int axis = int(word >> 13), threshold = int((word >> 8) & 31u), way = int(word & 0xffu);
-    bool below = at[axis] < threshold;
+    int axis = int(word >> 13);
+    int threshold = int((word >> 8) & 31u);
+    int way = int(word & 0xffu);
     int head = 1;
+    bool below = at[axis] < threshold;
     if (axis == 3 && threshold >= 8) {
-      // A thin wall, at a share of the cell's side; on it the facing tells.
-      int across = threshold - 8;
-      float beyond = point[across] - float(wordAt(i + 1)) / 65536.0;
-      bool onWall = abs(beyond) <= 1.0 / 1024.0 && facing / 2 == across;
-      below = onWall ? facing % 2 == 1 : beyond < 0.0;
+      // A thin wall, and where it is. On it the facing tells.
       head = 2;
+      float beyond = fraction[threshold - 8] - float(wordAt(i + 1)) / 65536.0;
+      bool onWall = abs(beyond) <= 1.0 / 1024.0 && at.w / 2 == threshold - 8;
+      below = onWall ? at.w % 2 == 1 : beyond < 0.0;
     }
     if (way == 0) i += below ? head + 2 : numberAt(i + head);
     else i += below ? head : way;

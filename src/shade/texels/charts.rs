@@ -1,8 +1,4 @@
-//! Where texels lie.
-//!
-//! A triangle has the texels of a rectangle: along the axis that it faces most, a, those of its bounds along the axes u and v that
-//! follow, row by row. `low + (i + ½)·side` is the centre of texel i along u and v. A double-sided triangle has them twice, its
-//! front's first.
+//! Which texels a triangle has, and where they are.
 
 use glam::{DVec2, Vec2, Vec3};
 

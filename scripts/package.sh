@@ -65,9 +65,13 @@ try_in_own_root() {
     while read -r library; do
         mkdir -p "$root$(dirname -- "$library")"
         cp -L -- "$library" "$root$library"
-    done < <(ldd "$stage/bin/lightprobe" "$stage"/lib/* | grep -o '/lib[^ ]*' | grep -v "$name" | sort -u)
-    unshare --map-root-user chroot "$root" "/$name/bin/lightprobe" bake "/$name/scenes/cornell.glb" -q \
-        --set grid.divisions='(3,3,3)' -o /tmp/cornell.probes >"$work/own_root.txt" 2>&1
+    done < <(ldd "$stage/bin/lightprobe" | sed -n 's/^\(.* => \)\?[[:space:]]*\(\/[^ ]*\) (.*/\2/p' | grep -v "/$name/" | sort -u)
+    # The loader finds what lies beside a program by /proc.
+    mkdir -p "$root/proc"
+    # shellcheck disable=SC2016
+    unshare --map-root-user --mount bash -c 'mount --rbind /proc "$1/proc" && exec chroot "$1" "${@:2}"' bash "$root" \
+        "/$name/bin/lightprobe" bake "/$name/scenes/cornell.glb" -q --set grid.divisions='(3,3,3)' -o /tmp/cornell.probes \
+        >"$work/own_root.txt" 2>&1
 }
 
 "$stage/bin/lightprobe" --version >/dev/null

@@ -1,6 +1,7 @@
 //! A volume of probes judged by a picture: the light that it gives with each way of treating visibility, what leaks, what it costs,
 //! and how far it is from a reference. `render` does it once for every camera, `sweep` for every configuration.
 
+use std::f32::consts::PI;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -9,23 +10,31 @@ use glam::Vec3;
 use crate::image::LayeredImage;
 use crate::light::World;
 use crate::math::color::luminance;
+use crate::math::random::{Numbers, Purpose, Random};
+use crate::math::sampling::cosine_hemisphere;
 use crate::probe::Volume;
 use crate::probe::capture::CaptureSettings;
-use crate::probe::query::Answers;
+use crate::probe::query::{Answers, Query};
 use crate::probe::transport::truth::Truth;
 use crate::report::baked::{self, BakedReport};
+use crate::report::glossy::{self, GlossyPart, GlossyReport, TracedRays};
 use crate::report::reference_layers::ReferenceLayers;
 use crate::report::render::{MethodReport, Timing};
 use crate::report::{air, error, leak};
 use crate::shade::air::{Air, AirTruth};
-use crate::shade::layers::compose;
-use crate::shade::points::View;
+use crate::shade::glossy::{Ends, Glossy, glosses};
+use crate::shade::layers::{compose, to_pixels};
+use crate::shade::points::{ImagePoint, View};
 use crate::shade::regions::Region;
-use crate::shade::visibility_modes::{VisibilityMode, exact_masks, irradiance, time_lookup, time_shading};
+use crate::shade::traced::Rays;
+use crate::shade::visibility_modes::{RUNS, VisibilityMode, exact_masks, irradiance, time_lookup, time_shading};
 use crate::system::progress::Progress;
 
 /// Name in the report of probes lit by full paths, with exact visibility.
 pub const PATH_RAY: &str = "path_ray";
+
+/// Name in the report of irradiance by rays that are traced in the probes.
+pub const DIFFUSE_RAYS: &str = "diffuse_rays";
 
 /// Where a picture is evaluated: what a camera sees, which is the same for all probes.
 pub struct Scenery<'a, 's> {
@@ -111,10 +120,82 @@ impl Scenery<'_, '_> {
                 air: air::measure(air, &in_air, &exact_in_air),
                 error: None,
                 error_gltf: None,
+                glossy: None,
             };
             step();
             Shaded { mode, image: compose(self.view, &irradiance), irradiance, in_air, report }
         })
+    }
+
+    /// Adds what surfaces reflect as gloss of the probes' light: the layer `glossy`, and `beauty_gltf`, the picture with it.
+    /// `reference` is of glossy transport, with the regions of its pixels and its samples a pixel. Nothing where the probes
+    /// hold no light for it, and where the scene has no glossy material.
+    pub fn shade_glossy(
+        &self,
+        query: &impl Answers,
+        masks: &[u8],
+        shaded: &mut [Shaded],
+        reference: Option<(&ReferenceLayers, &[Option<Region>], u32)>,
+    ) {
+        let Some((query, glosses)) = query.glossy().zip(glosses(self.world, self.view)) else { return };
+        let glossy = Glossy { world: self.world, view: self.view, glosses: &glosses, seed: self.seed };
+        let pixels = |radiance: &[Vec3]| to_pixels(self.view, |i, _| radiance[i]);
+        for s in shaded {
+            let (radiance, rays) = glossy.shade(&query, masks, s.mode, Ends::Proxy);
+            // The table and the caches are warm now.
+            let runs = if rays.rays > 0 { 1 } else { RUNS };
+            let time = |_| {
+                let started = Instant::now();
+                std::hint::black_box(glossy.shade(&query, masks, s.mode, Ends::Proxy));
+                started.elapsed().as_secs_f64() * 1e3
+            };
+            let layer = pixels(&radiance);
+            let beauty = to_pixels(self.view, |i, _| glossy.beauty(i, s.irradiance[i], radiance[i]));
+            let beauty = beauty.into_iter().zip(&self.view.sky).map(|(pixel, sky)| pixel + *sky).collect();
+            let parts = match reference {
+                Some(reference) if s.mode == VisibilityMode::On => glossy_parts(&glossy, &query, masks, reference),
+                _ => Vec::new(),
+            };
+            s.report.glossy = Some(GlossyReport {
+                shade_ms: Timing::of((0..runs).map(time).collect()),
+                bytes_per_probe: query.volume.radiance.glossy_bytes() as f64,
+                radiance_mean: mean_luminance(self.view, &radiance),
+                error_gltf: reference.map(|(layers, regions, _)| glossy::measure(layers, &layer, None, regions)),
+                parts,
+                traced: TracedRays::of(&rays),
+            });
+            s.image.push("glossy", layer);
+            s.image.push("beauty_gltf", beauty);
+        }
+    }
+
+    /// The picture whose irradiance comes from rays that are traced in the probes; `None` where a method traces none. All but
+    /// the picture's own figures are those of `like`.
+    pub fn shade_diffuse_rays(&self, query: &impl Answers, masks: &[u8], like: &Shaded) -> Option<Shaded> {
+        let query = query.diffuse_rays()?;
+        let (tracing, settings) = query.diffuse_tracing().zip(query.settings.diffuse.traced())?;
+        let rays = Rays { view: self.view, tracing, settings, seed: self.seed };
+        let direction = |_: usize, point: &ImagePoint, random: &mut Random| {
+            Some(cosine_hemisphere(point.query.normal, random.pair()))
+        };
+        let started = Instant::now();
+        let (radiance, _) = rays.trace(Purpose::DiffuseRays, direction, |_| 0.0);
+        let shown: Vec<Vec3> = radiance.into_iter().map(|l| l * PI).collect();
+        let shade_ms = Timing::of(vec![started.elapsed().as_secs_f64() * 1e3]);
+        let points = &self.view.points;
+        let exact = irradiance(&query, points, masks, VisibilityMode::Ray);
+        let report = MethodReport {
+            name: DIFFUSE_RAYS,
+            shade_ms,
+            lookup_ns: None,
+            lookup_spread_ns: None,
+            irradiance_indirect_mean: mean_luminance(self.view, &shown),
+            leak: leak::measure(&query, points, masks, VisibilityMode::On, &shown, &exact),
+            glossy: None,
+            ..like.report.clone()
+        };
+        let image = compose(self.view, &shown);
+        Some(Shaded { mode: VisibilityMode::On, image, irradiance: shown, in_air: like.in_air.clone(), report })
     }
 
     /// One look-up by its own rules, at these points of the air.
@@ -149,10 +230,45 @@ impl Scenery<'_, '_> {
             irradiance_indirect_mean: mean_luminance(self.view, &shown),
             leak: leak::measure(query, points, masks, mode, &shown, &exact),
             air: air::measure(air, &in_air, &exact_in_air),
+            glossy: None,
             ..like.clone()
         };
         Shaded { mode, image: compose(self.view, &shown), irradiance: shown, in_air, report }
     }
+}
+
+/// The error of gloss with one part after another made exact, and without its proxy: visibility of the probes, where reflected
+/// rays end, and the light that comes from there, which leaves the error of the model.
+fn glossy_parts(
+    glossy: &Glossy,
+    query: &Query,
+    masks: &[u8],
+    (layers, regions, spp): (&ReferenceLayers, &[Option<Region>], u32),
+) -> Vec<GlossyPart> {
+    /// Most paths from each point for exact light.
+    const MOST_PATHS: u32 = 256;
+    let view = glossy.view;
+    let part = |name, radiance: &[Vec3]| {
+        let pixels = to_pixels(view, |i, _| radiance[i]);
+        GlossyPart { name, error_gltf: glossy::measure(layers, &pixels, None, regions) }
+    };
+    let shaded = |name, mode, ends| part(name, &glossy.shade(query, masks, mode, ends).0);
+    let mut parts = Vec::new();
+    if query.settings.glossy.asks_levels() {
+        parts.push(shaded("without_parallax", VisibilityMode::On, Ends::Far));
+        parts.push(shaded("exact_visibility", VisibilityMode::Ray, Ends::Proxy));
+        parts.push(shaded("exact_parallax", VisibilityMode::Ray, Ends::Exact));
+    }
+    let model = glossy.model(spp.min(MOST_PATHS));
+    let mean: Vec<Vec3> = model.iter().map(|light| light.mean.as_vec3()).collect();
+    let pixels = to_pixels(view, |i, _| mean[i]);
+    let mut variance = vec![Vec3::ZERO; pixels.len()];
+    for (point, light) in view.points.iter().zip(&model) {
+        variance[point.pixel as usize] += light.variance().as_vec3() * point.weight * point.weight;
+    }
+    let error_gltf = glossy::measure(layers, &pixels, Some(&variance), regions);
+    parts.push(GlossyPart { name: "exact_light", error_gltf });
+    parts
 }
 
 impl Shaded {
@@ -170,12 +286,21 @@ impl Shaded {
         let error = Some(error::measure(layers, irradiance, regions, flips.as_ref()));
         let shown: Vec<bool> = regions.iter().map(Option::is_some).collect();
         let dark_region = leak::dark_region(irradiance, layers, &shown);
+        let black = leak::false_black(irradiance, layers, &shown);
         if with.glossy {
             self.report.error_gltf = error;
         } else {
             self.report.error = error;
         }
         self.report.leak.dark_region = dark_region;
+        self.report.leak.black = black;
+    }
+
+    /// Adds the error of the gloss, where it was shaded.
+    pub fn compare_glossy(&mut self, layers: &ReferenceLayers, regions: &[Option<Region>]) {
+        if let (Some(report), Some(layer)) = (&mut self.report.glossy, self.image.layer("glossy")) {
+            report.error_gltf = Some(glossy::measure(layers, layer, None, regions));
+        }
     }
 
     /// Adds the error in the air.

@@ -67,7 +67,6 @@ pub fn occlusion_bytes(config: &Config, placement: &Placement) -> f64 {
 /// What an active probe took in the mean, and how many others there are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PerProbe {
-    pub all: usize,
     pub left_out: usize,
     /// Of capture, bounces and fit.
     pub seconds: f64,
@@ -107,7 +106,7 @@ impl Plan {
             sky(scene),
             alpha(scene),
             textures(scene),
-            glossy(scene, config),
+            glossy(scene, config, grid.probe_count()),
             unsampled(config, looked),
         ];
         // The survey knows nothing of surfaces beyond the probes' hull.
@@ -123,11 +122,9 @@ impl Plan {
         Plan { lines, visibility, radiance_levels }
     }
 
-    /// Says what was saved: of probes that were left out what as many others took, of images and levels their bytes. Files say
-    /// none of it: that memory and time are those of a run.
-    pub fn measure(&mut self, scene: &Scene, config: &Config, probes: &PerProbe) {
-        let side = config.capture.rays.side().unwrap_or(0);
-        let (_, levels) = config.store.radiance().runtime_bytes(side, config.store.layout.g_buffer);
+    /// Says what was saved: of probes that were left out what as many others took, of images their bytes. Files say none of it:
+    /// that memory and time are those of a run.
+    pub fn measure(&mut self, scene: &Scene, probes: &PerProbe) {
         for line in &mut self.lines {
             let left_out = probes.left_out as f64;
             match line.stage {
@@ -135,7 +132,6 @@ impl Plan {
                     line.saved_s = Some(probes.seconds * left_out);
                     line.saved_bytes = Some((probes.capture_bytes * left_out).round() as u64);
                 }
-                RADIANCE_LEVELS if !line.kept && levels > 0 => line.saved_bytes = Some((levels * probes.all) as u64),
                 TEXTURES if scene.collapsed_bytes > 0 => line.saved_bytes = Some(scene.collapsed_bytes),
                 _ => {}
             }
@@ -220,14 +216,28 @@ fn textures(scene: &Scene) -> Line {
 /// The stage of levels of radiance for glossy surfaces.
 const RADIANCE_LEVELS: &str = "radiance_levels";
 
-fn glossy(scene: &Scene, config: &Config) -> Line {
-    let glossy = scene.materials.iter().filter(|m| !m.unlit && (m.metallic > 0.0 || m.roughness < 1.0)).count();
+/// Materials of a scene that reflect more at some angles than at others.
+pub fn glossy_materials(scene: &Scene) -> usize {
+    scene.materials.iter().filter(|m| !m.unlit && (m.metallic > 0.0 || m.roughness < 1.0)).count()
+}
+
+fn glossy(scene: &Scene, config: &Config, probes: usize) -> Line {
     let levels = config.store.prefiltered.len();
-    match glossy {
-        0 => line(RADIANCE_LEVELS, false, "no glossy material"),
-        n if levels == 0 => {
+    match glossy_materials(scene) {
+        0 if levels == 0 => line(RADIANCE_LEVELS, false, "no glossy material"),
+        0 => {
+            let (_, per_probe) = config.store.radiance().runtime_bytes(0, false);
+            Line {
+                saved_bytes: Some((per_probe * probes) as u64),
+                ..line(RADIANCE_LEVELS, false, "no glossy material")
+            }
+        }
+        n if levels == 0 && config.query.glossy.is_none() => {
             let reason = format!("{n} glossy material(s), but the method stores irradiance only");
             line(RADIANCE_LEVELS, false, reason)
+        }
+        n if levels == 0 => {
+            line(RADIANCE_LEVELS, true, format!("{n} glossy material(s), shaded from the probes' light fields"))
         }
         n => line(RADIANCE_LEVELS, true, format!("{n} glossy material(s), {levels} level(s)")),
     }

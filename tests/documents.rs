@@ -62,7 +62,11 @@ fn quick(commands: &str) -> String {
         let rest = words[i].split_once('\n').map(|(_, rest)| format!("\n{rest}")).unwrap_or_default();
         words[i] = value.to_owned() + &rest;
     }
-    words.join(" ")
+    let one_seed = |line: &str| match line.starts_with("lightprobe sweep ") && !line.contains("--seeds") {
+        true => format!("{line} --seeds 1\n"),
+        false => format!("{line}\n"),
+    };
+    words.join(" ").lines().map(one_seed).collect()
 }
 
 /// Runs all commands of a document in one shell, as a reader would from the root of the repository.

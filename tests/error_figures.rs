@@ -11,7 +11,7 @@ use lightprobe::light::World;
 use lightprobe::math::random::{Purpose, Random};
 use lightprobe::report::error::flip::{Flip, measure as measure_flip};
 use lightprobe::report::error::{ErrorReport, Figures, measure};
-use lightprobe::report::leak::dark_region;
+use lightprobe::report::leak::{dark_region, false_black};
 use lightprobe::report::reference_layers::{ReferenceError, ReferenceLayers};
 use lightprobe::scene::{self, Camera, LoadOptions};
 use lightprobe::shade::points::see;
@@ -338,6 +338,21 @@ fn the_dark_region_is_where_the_reference_is_surely_dark() {
     assert_eq!(dark_region(&method, &layers(&truth, None, None, None), &shown), None);
     let bright = layers(&vec![Vec3::ONE; PIXELS], Some(vec![Vec3::ZERO; PIXELS]), None, None);
     assert_eq!(dark_region(&method, &bright, &shown), None);
+}
+
+#[test]
+fn what_gets_hardly_any_of_its_light_is_falsely_black() {
+    let mut truth = vec![Vec3::ONE; PIXELS];
+    // Dark, so that black is right.
+    truth[..100].fill(Vec3::splat(1e-4));
+    let mut method = vec![Vec3::splat(0.06); PIXELS];
+    method[..200].fill(Vec3::splat(0.04));
+    let mut shown = [true; PIXELS];
+    let reference = layers(&truth, None, None, None);
+    close(false_black(&method, &reference, &shown), 100.0 / (PIXELS - 100) as f64);
+    shown[100..150].fill(false);
+    close(false_black(&method, &reference, &shown), 50.0 / (PIXELS - 150) as f64);
+    assert_eq!(false_black(&method, &layers(&vec![Vec3::ZERO; PIXELS], None, None, None), &shown), None);
 }
 
 /// Every pixel gets twice the light that would be dark, by one of fifty samples. With 32 of them half of the pixels find

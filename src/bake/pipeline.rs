@@ -72,7 +72,7 @@ impl Prepared<'_, '_> {
             volume.occlusion = unasked;
         }
         let container = self.encode(&volume, &plan, fit.as_ref(), circumstances.seed, scene, &mut log);
-        plan.measure(self.world.scene, config, &self.per_probe(&captures, &log));
+        plan.measure(self.world.scene, &self.per_probe(&captures, &log));
         let Log { rays, times, numerics, .. } = log;
         let runtime_bytes = self.runtime_bytes();
         let unsaved = saving.failure();
@@ -86,7 +86,6 @@ impl Prepared<'_, '_> {
         let Times { capture, bounces, fit, .. } = log.times;
         let of_one = |all: f64| all / active.max(1) as f64;
         PerProbe {
-            all: states.len(),
             left_out: states.len() - active,
             seconds: of_one(capture + bounces + fit),
             capture_bytes: of_one(captures.bytes as f64),
@@ -158,7 +157,9 @@ impl Prepared<'_, '_> {
         // Times stay out of the file: the same input must give the same bytes.
         let lines: Vec<_> = plan.lines.iter().map(|l| Line { saved_s: None, ..l.clone() }).collect();
         let plan = serde_json::json!({ "visibility": plan.visibility, "lines": lines });
-        let (text, query) = (config.to_ron(), config.query_record());
+        let mut query = config.query_record();
+        query.weights.glossy = query.weights.glossy.resolved(config.grid.bounds_in(self.world.scene));
+        let text = config.to_ron();
         let border = config.store.border;
         let fit = fit.map(FitFigures::record);
         let provenance =

@@ -25,7 +25,8 @@ pub struct ExportArgs {
     /// air (three, bevy).
     #[arg(long, requires = "scene")]
     pub fit: bool,
-    /// one: the grid as it is. auto: one volume for each room that is closed to the others, up to its walls (three, bevy).
+    /// one: the grid as it is. auto: one volume for each room, up to its walls, and one for each opening between rooms, a layer
+    /// of probes into both (three, bevy).
     #[arg(long, value_enum, default_value = "one")]
     pub volumes: VolumesName,
     /// Override one key of the fit, for example fit.rows.lambda=0.3; may be repeated.

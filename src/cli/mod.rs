@@ -1,5 +1,6 @@
 //! The command line: what was typed. `commands/` turns it into what it means.
 
+mod convert;
 mod export;
 mod inspect;
 mod look;
@@ -15,11 +16,12 @@ use clap::{Args, Parser, Subcommand};
 
 use crate::probe::lattice::grid::MAX_PROBES;
 
+pub use self::convert::{ConvertArgs, LatticeName};
 pub use self::export::{EngineName, ExportArgs, TargetName, VolumesName};
 pub use self::inspect::{HelpArgs, InspectArgs};
 pub use self::look::LookArgs;
 pub use self::trace::TraceArgs;
-pub use self::values::{LookAt, PictureSize};
+pub use self::values::{LookAt, PictureSize, TraceRay};
 use self::values::{parse_exposure, parse_index, parse_positive, parse_seconds, parse_size, parse_target_error};
 
 /// Bakes light-field probe volumes for global illumination and measures how much they leak, err and cost.
@@ -360,33 +362,6 @@ pub struct DiffArgs {
     /// the old BASE or the new one; sides that cannot be compared leave it alone.
     #[arg(long)]
     pub update_baseline: bool,
-}
-
-#[derive(Debug, Args)]
-pub struct ConvertArgs {
-    /// Probe file that `bake` wrote.
-    #[arg(value_name = "PROBES")]
-    pub probes: PathBuf,
-    /// Scene that it was baked from: a .glb or .gltf file.
-    #[arg(value_name = "SCENE")]
-    pub scene: PathBuf,
-    #[command(flatten)]
-    pub trace: TraceArgs,
-    /// Probe file to write.
-    #[arg(short, long, value_name = "OUT.probes")]
-    pub output: PathBuf,
-    /// The lattice that the probes are put on.
-    #[arg(long, value_enum)]
-    pub to: LatticeName,
-    /// Convert although the scene has changed since the bake.
-    #[arg(long)]
-    pub allow_scene_change: bool,
-}
-
-/// Lattices by the names of the command line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum LatticeName {
-    Uniform,
 }
 
 #[cfg(test)]

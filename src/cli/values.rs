@@ -56,6 +56,30 @@ impl FromStr for LookAt {
     }
 }
 
+/// A ray in world space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TraceRay {
+    pub origin: [f64; 3],
+    /// Of any length above zero.
+    pub direction: [f64; 3],
+}
+
+impl FromStr for TraceRay {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<TraceRay, String> {
+        let numbers: Option<Vec<f64>> =
+            text.split(',').map(|s| s.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
+        let Some(&[a, b, c, d, e, f]) = numbers.as_deref() else {
+            return Err("write six numbers, a point and a direction: ox,oy,oz,dx,dy,dz".into());
+        };
+        if [d, e, f] == [0.0; 3] {
+            return Err("the direction has no length".into());
+        }
+        Ok(TraceRay { origin: [a, b, c], direction: [d, e, f] })
+    }
+}
+
 pub fn parse_exposure(text: &str) -> Result<f32, String> {
     let ev: Option<f32> = text.parse().ok().filter(|ev: &f32| ev.abs() <= 100.0);
     ev.ok_or_else(|| "write a number from -100 to 100".into())

@@ -11,16 +11,21 @@ use crate::report::diff::mask::Mask;
 use crate::report::diff::shown;
 use crate::report::diff::thresholds::Thresholds;
 use crate::report::diff::{Compared, DiffReport, Request, compare, junit, markdown};
+use crate::report::gate::Gate;
 use crate::report::header::command_line;
 use crate::report::table::{Column, Table};
 use crate::report::words::{in_unit, margin, of_side, outcome, value};
 use crate::system::output::{self, Named, check_folder, check_outputs, create_folder, write_atomically};
+use crate::system::terminal;
 
 /// Files that the folder gets besides the difference maps.
 const JSON: &str = "diff.json";
 const MARKDOWN: &str = "diff.md";
 const JUNIT: &str = "junit.xml";
 const PAGE: &str = "index.html";
+
+/// Columns from which on a terminal shows all there is of a gate.
+const WIDE: usize = 120;
 
 /// Gates that pass and are printed all the same, the closest to their thresholds first.
 const CLOSEST: usize = 10;
@@ -104,6 +109,22 @@ fn print(args: &DiffArgs, console: &Console, report: &DiffReport) -> Result<()> 
     if console.json {
         return console.print(&serde_json::to_string_pretty(report)?);
     }
+    let failing = report.gates.iter().filter(|g| g.fails() || g.waived);
+    let passing = report.gates.iter().filter(|g| !g.fails() && !g.waived && g.is_judged());
+    let times = report.gates.iter().filter(|g| !g.is_judged());
+    let listed: Vec<&Gate> = failing.chain(passing.clone().take(CLOSEST)).chain(times).collect();
+    let table = if terminal::width().is_some_and(|width| width < WIDE) { narrow(&listed) } else { wide(&listed) };
+    console.print(&table.to_string())?;
+    let more = passing.count().saturating_sub(CLOSEST);
+    if more > 0 {
+        console.print(&format!("and {more} more gates that pass"))?;
+    }
+    console.print(&report.verdict.sentence)?;
+    console.print(&format!("wrote {}", args.output.display()))
+}
+
+/// All columns side by side.
+fn wide(gates: &[&Gate]) -> Table {
     let mut table = Table::new(&[
         ("", Column::Text),
         ("gate", Column::Text),
@@ -115,11 +136,7 @@ fn print(args: &DiffArgs, console: &Console, report: &DiffReport) -> Result<()> 
         ("margin", Column::Number),
         ("from", Column::Text),
     ]);
-    let failing = report.gates.iter().filter(|g| g.fails() || g.waived);
-    let passing = report.gates.iter().filter(|g| !g.fails() && !g.waived && g.is_judged());
-    let times = report.gates.iter().filter(|g| !g.is_judged());
-    let listed = failing.chain(passing.clone().take(CLOSEST)).chain(times);
-    for gate in listed {
+    for gate in gates {
         table.push([
             outcome(gate).to_owned(),
             gate.name.clone(),
@@ -132,11 +149,24 @@ fn print(args: &DiffArgs, console: &Console, report: &DiffReport) -> Result<()> 
             gate.source.clone(),
         ]);
     }
-    console.print(&table.to_string())?;
-    let more = passing.count().saturating_sub(CLOSEST);
-    if more > 0 {
-        console.print(&format!("and {more} more gates that pass"))?;
+    table
+}
+
+/// For terminals that are too narrow for that: the sides' own figures are in the files.
+fn narrow(gates: &[&Gate]) -> Table {
+    let mut table = Table::new(&[
+        ("gate", Column::Text),
+        ("difference", Column::Number),
+        ("threshold", Column::Number),
+        ("margin", Column::Number),
+    ]);
+    for gate in gates {
+        table.push([
+            format!("{} {} {}", outcome(gate), gate.name, gate.item),
+            value(gate),
+            in_unit(gate.threshold, gate.unit),
+            margin(gate),
+        ]);
     }
-    console.print(&report.verdict.sentence)?;
-    console.print(&format!("wrote {}", args.output.display()))
+    table
 }

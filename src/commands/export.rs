@@ -46,7 +46,7 @@ pub fn run(args: &ExportArgs, console: &Console) -> Result<()> {
     let to = Target::from(args.to);
     check_arguments(args, to)?;
     check_folder(&args.output)?;
-    let settings = fit_settings(args)?;
+    let settings = fit_settings(args, to)?;
     let probes = file::read(&args.probes)?;
     tell::probes(console, &args.probes, &probes);
     let place = args.probes.display();
@@ -98,9 +98,11 @@ fn check_arguments(args: &ExportArgs, to: Target) -> Result<()> {
     Ok(())
 }
 
-/// The settings of the fit: the defaults, and what `--set` says of them.
-fn fit_settings(args: &ExportArgs) -> Result<RowSettings> {
-    let base = Config { fit: Fit::Rows(RowSettings::default()), ..Config::default() };
+/// The settings of the fit: the defaults of the engine, and what `--set` says of them.
+fn fit_settings(args: &ExportArgs, to: Target) -> Result<RowSettings> {
+    let own = RowSettings::default();
+    let air = to.rules().map_or(own.air, Rules::air_weight);
+    let base = Config { fit: Fit::Rows(RowSettings { air, ..own }), ..Config::default() };
     if let Some(other) = args.set.iter().find(|set| !set.starts_with("fit")) {
         bail!("--set {other}: an export has the keys of fit.rows alone; bake again to change others");
     }
@@ -169,7 +171,7 @@ fn make(args: &ExportArgs, to: Target, probes: &ProbeFile, volume: &Volume, besi
         }
         (_, beside) => {
             warnings.extend(beside.and_then(|(_, world, _)| rooms::shared(world, volume)));
-            made::one_block(volume, query, rules)
+            made::one_block(volume, query, rules, beside.map(|(_, world, _)| world))
         }
     };
     let (record, report) = match beside {
@@ -199,7 +201,7 @@ pub fn unfitted(
 ) -> Result<Export> {
     let query = &probes.query.weights;
     let grids = |rules: Rules| {
-        let (grids, notes) = made::one_block(volume, query, rules);
+        let (grids, notes) = made::one_block(volume, query, rules, world);
         Export::of_grids(&grids, &notes, origin, None)
     };
     Ok(match (to, to.rules()) {

@@ -1,22 +1,28 @@
 //! `lightprobe inspect`: what a probe file holds.
 
+use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Result, ensure};
-use glam::Vec3;
+use anyhow::{Result, bail, ensure};
+use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
 
 use super::{Console, kinds, tell};
-use crate::cli::InspectArgs;
+use crate::cli::{InspectArgs, TraceRay};
 use crate::plan::stage_in_words;
 use crate::probe::file::published::threev8_bytes;
 use crate::probe::file::{self, FORMAT, ProbeFile};
 use crate::probe::lattice::ProbeState;
 use crate::probe::lattice::tree::Tree;
+use crate::probe::query::QuerySettings;
+use crate::probe::query::march::Step;
+use crate::probe::query::trace::{End, Tracing};
 use crate::probe::store::tiles::TileStore;
 use crate::probe::{ProbeIndex, Volume};
+use crate::report::ray_path::{self, Paths};
 use crate::report::table::{Column, Table};
 use crate::system::format;
+use crate::system::output::{Named, check_outputs};
 
 /// Significant digits of irradiance; the finest format, f32, holds about seven.
 const DIGITS: usize = 6;
@@ -32,10 +38,65 @@ pub fn run(args: &InspectArgs, console: &Console) -> Result<()> {
         let count = volume.states.len();
         ensure!((probe as usize) < count, "--probe {probe}: {} holds probes 0 to {}", args.probes.display(), count - 1);
     }
+    if let (Some(ray), Some(output)) = (&args.trace, &args.output) {
+        return draw_ray(args, volume, &file.query.weights, ray, output, console);
+    }
     if console.json {
         return console.print(&serde_json::to_string_pretty(&to_json(&file, args.probe))?);
     }
     console.print(&to_text(&file, args.probe))
+}
+
+/// Most probes whose maps are drawn.
+const MOST_DRAWN: usize = 8;
+
+/// Traces a ray in the probes, or in one of them, draws its way and says where it ends.
+fn draw_ray(
+    args: &InspectArgs,
+    volume: &Volume,
+    weights: &QuerySettings,
+    ray: &TraceRay,
+    output: &Path,
+    console: &Console,
+) -> Result<()> {
+    let probes = args.probes.display();
+    let settings = weights.glossy.traced().copied().unwrap_or_default();
+    let field = volume.radiance.light_field.as_ref();
+    let Some((tracing, field)) = Tracing::new(volume, &settings).zip(field) else {
+        bail!(
+            "--trace: {probes} holds no light fields that rays march through; bake with --preset mcguire-2017, or with \
+             store.light_field march(lowest: n)"
+        );
+    };
+    check_outputs(&[Named::new("-o", output)], &[Named::new("the probe file", &args.probes)])?;
+    let origin = (DVec3::from(ray.origin) - volume.grid.origin_world()).as_vec3();
+    let direction = DVec3::from(ray.direction).normalize().as_vec3();
+    let mut paths = Paths::default();
+    let end = match args.probe {
+        Some(probe) => {
+            paths.0.push(ray_path::Path { probe: probe as usize, ..Default::default() });
+            match tracing.ask(ProbeIndex(probe), origin, direction, 0.0, &mut paths) {
+                Step::Hit { t, .. } => format!("probe {probe} sees a surface at {t} m"),
+                Step::Miss => format!("probe {probe} sees all of the ray and no surface"),
+                Step::Unknown { clear } => format!("probe {probe} sees the ray up to {clear} m"),
+            }
+        }
+        None => {
+            let begin = |paths: &mut Paths, (probe, _): (ProbeIndex, f32)| {
+                paths.0.push(ray_path::Path { probe: probe.0 as usize, ..Default::default() });
+            };
+            let traced = tracing.follow(origin, direction, &mut paths, begin);
+            let end = match traced.end {
+                End::Hit { t, probe, .. } => format!("a surface at {t} m, found by probe {}", probe.0),
+                End::Miss { probe } => format!("no surface, as probe {} sees", probe.0),
+                End::Lost { clear, .. } => format!("no probe sees on from {clear} m"),
+            };
+            format!("{end}; probes asked: {} in {} cell(s)", traced.probes, traced.cells)
+        }
+    };
+    let (coarse, fine) = paths.0.iter().fold((0, 0), |(c, f), p| (c + p.coarse.len(), f + p.fine.len()));
+    ray_path::draw(field, &paths, MOST_DRAWN).write_png(output)?;
+    console.print(&format!("{end}\nread {coarse} lowest distances and {fine} texels\nwrote {}", output.display()))
 }
 
 fn states(volume: &Volume) -> [usize; 3] {

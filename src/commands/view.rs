@@ -8,7 +8,7 @@ use glam::Vec3;
 use serde_json::json;
 
 use super::session::{Opening, Probes, Session};
-use super::{Console, tell};
+use super::{Console, kinds, tell};
 use crate::cli::LookArgs;
 use crate::image::Picture;
 use crate::light::World;
@@ -25,6 +25,9 @@ use crate::system::format;
 use crate::system::output::{Named, write_atomically};
 
 pub fn run(args: &LookArgs, console: &Console) -> Result<()> {
+    let usage = "view SCENE PROBES -o FILE.html";
+    kinds::expect_scene(&args.scene, usage)?;
+    kinds::expect_probes(&args.probes, usage)?;
     let probes = file::read(&args.probes)?;
     let session = Session::open(opening(args, &probes), console)?;
     let scene = &session.scene;

@@ -59,6 +59,11 @@ impl Config {
                 format!("capture.rays.fibonacci.count is {rays}: placement.rule keeps {reserved} of them; use more");
             return Some((&["capture", "placement"], what));
         }
+        let has_radiance = !store.radiance().is_empty();
+        let marches = store.light_field.marches();
+        if let Some(what) = query.glossy.mismatch(has_radiance, marches).or(query.diffuse.mismatch(marches)) {
+            return Some((&["store", "query"], what));
+        }
         None
     }
 

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ron_text::ron_options;
 use crate::probe::capture::CaptureSettings;
-use crate::probe::file::{LightRecord, QUERY_VERSION, QueryRecord};
+use crate::probe::file::{LightRecord, QueryRecord};
 use crate::probe::fit::Fit;
 use crate::probe::lattice::grid::GridSettings;
 use crate::probe::place::PlacementSettings;
@@ -79,6 +79,15 @@ pub enum PlanMode {
     KeepEverything,
 }
 
+/// Lines of a configuration that say nothing, see [`Config::to_ron`].
+const SILENT: &[&str] = &[
+    "\n            centred: false,",
+    "\n        prefilter: halved,",
+    "\n        least_weight: 0.0,",
+    "\n        glossy: none,",
+    "\n        diffuse: stored,",
+];
+
 /// Names of the stages that a plan can leave out.
 pub const STAGES: &[&str] = &[
     "punctual_shadow_rays",
@@ -106,11 +115,13 @@ impl PlanSettings {
 }
 
 impl Config {
-    /// The whole configuration as RON with every key, so that it means the same over any preset.
+    /// The whole configuration as RON with every key, so that it means the same over any preset; without keys that say nothing
+    /// and that files and results of before do not have.
     pub fn to_ron(&self) -> String {
         let pretty = ron::ser::PrettyConfig::new().indentor("    ").new_line("\n");
         // Plain records of numbers and enums: nothing in them can fail to serialise.
-        ron_options().to_string_pretty(self, pretty).unwrap_or_default()
+        let text = ron_options().to_string_pretty(self, pretty).unwrap_or_default();
+        SILENT.iter().fold(text, |text, line| text.replace(line, ""))
     }
 
     /// What tells it from others where results are kept: [`Self::to_ron`], in which a fit that is none is not named, so that
@@ -129,7 +140,7 @@ impl Config {
     /// What a probe file says about asking its probes.
     pub fn query_record(&self) -> QueryRecord {
         QueryRecord {
-            version: QUERY_VERSION,
+            version: QueryRecord::version_of(&self.query),
             weights: self.query.clone(),
             moved: self.placement.rule.moves(),
             light: self.light(),

@@ -267,7 +267,7 @@ fn keys_of_choices_that_are_not_taken_are_refused() {
         (
             &["capture.rays.fibonacci.guided=1"],
             &[
-                "capture.rays is octahedral (keys: guided, per_texel, resolution)",
+                "capture.rays is octahedral (keys: centred, guided, per_texel, resolution)",
                 "fibonacci has no such key, only count; did you mean capture.rays.octahedral.guided?",
             ],
         ),
@@ -351,6 +351,8 @@ fn published_layouts_have_their_published_sizes() {
     assert_eq!(bytes("ddgi-2019"), [8, 256, 1024, 0, 0]);
     assert_eq!(bytes("irradiance-2022"), [0, 65_536, 0, 0, 87_296]);
     assert_eq!(bytes("irradiance-2022").iter().sum::<usize>(), 152_832);
+    // 1024² texels of 8 bytes, 64² lowest distances of 2, and irradiance and moments of 128²: 8.13 MiB.
+    assert_eq!(bytes("mcguire-2017"), [0, 65_536, 65_536, 8 * 1024 * 1024 + 2 * 64 * 64, 0]);
     // 192 KiB of what it names, and 576 KiB that its table says.
     assert_eq!(bytes("lightfield-2022"), [0, 65_536, 65_536, 65_536, 0]);
     // 8² + border of packed colours and 16² + border of two u16; places, levels and the index are the grid's.

@@ -8,6 +8,8 @@ use super::holes;
 use super::reader::{AXES, Form, Reader};
 use super::record::{Moved, Notes, Number, VolumeRecord};
 use super::rules::Rules;
+use super::sight::Sight;
+use crate::light::World;
 use crate::probe::query::{Query, QuerySettings};
 use crate::probe::{Grid, Volume};
 
@@ -19,14 +21,16 @@ pub fn form(rules: Rules) -> Form {
     }
 }
 
-/// A volume as one block: the probes of its lattice where they are active, neighbours' light where they are not.
-pub fn one_block(volume: &Volume, query: &QuerySettings, rules: Rules) -> (Grids, Vec<Notes>) {
+/// A volume as one block: the probes of its lattice where they are active, neighbours' light where they are not. Where the
+/// scene is known, rays tell which neighbours.
+pub fn one_block(volume: &Volume, query: &QuerySettings, rules: Rules, world: Option<&World>) -> (Grids, Vec<Notes>) {
     let uniform = volume.grid.uniform();
     let block = Block { first: uniform.origin(), spacing: uniform.spacing(), divisions: uniform.divisions(), start: 0 };
     let reader = Reader::new(Query { volume, settings: query }, form(rules));
     let found: Vec<_> = (0..block.count() as u32).map(|i| reader.at(block.coordinate(i))).collect();
     let known = found.iter().map(|found| found.map(|(probe, _)| reader.of_probe(probe))).collect();
-    let (values, holes) = holes::filled(&reader, &block, known);
+    let sight = world.map(|world| Sight::new(world, volume));
+    let (values, holes) = holes::filled(&reader, &block, known, sight.as_ref());
     let mut grids = Grids::new(rules, uniform, vec![block]);
     values.iter().enumerate().for_each(|(probe, values)| grids.set_probe(probe, values));
     let moved = moved(&found, volume.grid.spacing_min());

@@ -24,6 +24,7 @@ mod reader;
 pub mod record;
 pub mod rooms;
 mod rules;
+mod sight;
 mod target;
 #[cfg(test)]
 mod tests;

@@ -43,6 +43,11 @@ impl<'v> Reader<'v> {
         Reader { query, form, directions, of_look_ups: Projection::of(&evenly), of_axes }
     }
 
+    /// The method's own look-up.
+    pub fn look_up(&self) -> &Query<'v> {
+        &self.query
+    }
+
     /// Values of a probe.
     pub fn unknowns(&self) -> usize {
         match &self.form {

@@ -76,6 +76,24 @@ fn white_base_albedo(cosine: f32) -> f32 {
     (1.0 - DIELECTRIC_F0) * (1.0 - weight)
 }
 
+/// Reflectance along the normal and roughness of a surface, and whether it is unlit.
+fn lobe_of(world: &World, point: &SurfacePoint) -> (Vec3, f32, bool) {
+    let scene = world.scene;
+    let hit = &point.hit;
+    let color = scene.base_color(hit.triangle, hit.barycentric).truncate().clamp(Vec3::ZERO, Vec3::ONE);
+    let (roughness, metallic) = scene.roughness_metallic(hit.triangle, hit.barycentric);
+    let unlit = scene.material(hit.triangle).unlit;
+    let f0 = if unlit { Vec3::ZERO } else { Vec3::splat(DIELECTRIC_F0).lerp(color, metallic) };
+    // The bound on albedos holds for mirrors too: light between two facing mirrors would not converge either.
+    (f0.min(Vec3::splat(world.albedo_max)), roughness, unlit)
+}
+
+/// Reflectance along the normal and perceptual roughness of a surface's glossy lobe; `None` where it reflects nothing.
+pub fn gloss(world: &World, point: &SurfacePoint) -> Option<(Vec3, f32)> {
+    let (f0, roughness, unlit) = lobe_of(world, point);
+    (!unlit).then_some((f0, roughness))
+}
+
 #[derive(Debug, Clone, Copy)]
 pub struct Layered {
     normal: Vec3,
@@ -96,14 +114,8 @@ pub struct Layered {
 impl Layered {
     /// `normal` is the shading normal; `view` the unit direction towards the viewer.
     pub fn new(world: &World, point: &SurfacePoint, normal: Vec3, view: Vec3) -> Layered {
-        let scene = world.scene;
-        let hit = &point.hit;
-        let color = scene.base_color(hit.triangle, hit.barycentric).truncate().clamp(Vec3::ZERO, Vec3::ONE);
-        let (roughness, metallic) = scene.roughness_metallic(hit.triangle, hit.barycentric);
-        let unlit = scene.material(hit.triangle).unlit;
-        let f0 = if unlit { Vec3::ZERO } else { Vec3::splat(DIELECTRIC_F0).lerp(color, metallic) };
-        // The bound on albedos holds for mirrors too: light between two facing mirrors would not converge either.
-        Layered::of(point.albedo, f0.min(Vec3::splat(world.albedo_max)), roughness, normal, view, unlit)
+        let (f0, roughness, unlit) = lobe_of(world, point);
+        Layered::of(point.albedo, f0, roughness, normal, view, unlit)
     }
 
     fn of(albedo: Vec3, f0: Vec3, roughness: f32, normal: Vec3, view: Vec3, unlit: bool) -> Layered {

@@ -20,6 +20,7 @@ pub mod punctual;
 mod roulette;
 pub mod sampled;
 pub mod sides;
+pub mod split_sum;
 pub mod surface;
 
 use crate::scene::{Material, Scene};

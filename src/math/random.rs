@@ -46,6 +46,12 @@ pub enum Purpose {
     HeldOutPoints = 22,
     /// Paths from these points.
     HeldOutPaths = 23,
+    /// Glossy rays that are traced in probes.
+    GlossyRays = 32,
+    /// Paths of exact glossy light.
+    GlossyPaths = 33,
+    /// Rays for irradiance that are traced in probes.
+    DiffuseRays = 34,
 }
 
 /// A source of numbers for random decisions: a [`Random`] stream, or a point of an evenly distributed set

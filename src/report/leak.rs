@@ -34,6 +34,9 @@ pub struct Leak {
     /// Mean irradiance where the reference is dark, as a share of the reference's mean; see [`dark_region`]. `null`
     /// without a reference.
     pub dark_region: Option<f64>,
+    /// Share of the pixels with light in the reference that get hardly any; see [`false_black`]. `null` without a reference.
+    #[serde(default)]
+    pub black: Option<f64>,
     /// Σ max(0, E_p − E_path) ÷ ΣE_path over active probes: the light that leaked into the probes themselves
     /// ([`super::baked`]). `null` without a traced reference.
     pub baked: Option<f64>,
@@ -83,6 +86,21 @@ pub fn dark_region(irradiance: &[Vec3], reference: &ReferenceLayers, shown: &[bo
     let is_dark = |i: &usize| used(*i) && least(*i) < DARK_SHARE * mean && most(*i) < DARK_SHARE * mean;
     let dark: Moments = (0..irradiance.len()).filter(is_dark).map(|i| f64::from(luminance(irradiance[i]))).collect();
     (dark.weight() > 0.0).then(|| dark.mean() / mean)
+}
+
+/// A lit pixel is black if it gets less than this share of its light: more than four stops are missing.
+const BLACK_SHARE: f64 = 0.05;
+
+/// Share of the pixels that are falsely black: E < [`BLACK_SHARE`]·E_ref, of those with E_ref above
+/// [`DARK_SHARE`]·mean(E_ref). `shown` tells for each pixel whether it shows a surface. `None` where none is lit.
+pub fn false_black(irradiance: &[Vec3], reference: &ReferenceLayers, shown: &[bool]) -> Option<f64> {
+    let used = |i: usize| shown[i] && reference.is_finite(i) && irradiance[i].is_finite();
+    let mean = reference.means(used).0.filter(|mean| *mean > 0.0)?;
+    let light = |e: Vec3| f64::from(luminance(e));
+    let is_lit = |i: &usize| used(*i) && light(reference.irradiance[*i]) > DARK_SHARE * mean;
+    let lit: Vec<usize> = (0..irradiance.len()).filter(is_lit).collect();
+    let is_black = |i: &&usize| light(irradiance[**i]) < BLACK_SHARE * light(reference.irradiance[**i]);
+    Some(lit.iter().filter(is_black).count() as f64 / lit.len() as f64)
 }
 
 const WINDOW_PIXELS: usize = (2 * DARK_WINDOW + 1) * (2 * DARK_WINDOW + 1);

@@ -10,6 +10,10 @@ use crate::math::color::luminance;
 const IRRADIANCE: &str = "irradiance_indirect";
 const BEAUTY: &str = "beauty";
 
+/// What surfaces reflect as gloss, where a reference is of glossy transport, and its variance.
+const GLOSSY: &str = "glossy";
+const GLOSSY_VARIANCE: &str = "glossy_variance";
+
 /// Layers with the variance of the pixel's mean, per channel; absent where it is not known.
 const IRRADIANCE_VARIANCE: &str = "irradiance_indirect_variance";
 const BEAUTY_VARIANCE: &str = "beauty_variance";
@@ -88,6 +92,20 @@ impl ReferenceLayers {
             noise,
             beauty: image.picture(BEAUTY).ok_or_else(|| missing(BEAUTY))?,
             beauty_variance: layer(BEAUTY_VARIANCE),
+        })
+    }
+
+    /// The same of the radiance that surfaces reflect as gloss, W·m⁻²·sr⁻¹, in place of irradiance; `None` where the picture
+    /// does not hold it.
+    pub fn of_glossy(image: &LayeredImage, blocks: Option<u32>) -> Option<ReferenceLayers> {
+        let layer = |name: &str| image.layer(name).map(<[Vec3]>::to_vec);
+        Some(ReferenceLayers {
+            width: image.width,
+            height: image.height,
+            irradiance: layer(GLOSSY)?,
+            noise: layer(GLOSSY_VARIANCE).map(|variance| ReferenceNoise { variance, covariance: None, blocks }),
+            beauty: image.picture(BEAUTY)?,
+            beauty_variance: None,
         })
     }
 

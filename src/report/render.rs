@@ -5,8 +5,10 @@ use serde::Serialize;
 use super::air::AirFigures;
 use super::baked::BakedReport;
 use super::error::ErrorReport;
+use super::glossy::GlossyReport;
 use super::header::Header;
 use super::leak::Leak;
+pub use super::timing::Timing;
 
 /// Version of the report's layout.
 pub const SCHEMA: &str = "lightprobe-render/1";
@@ -100,21 +102,8 @@ pub struct MethodReport {
     /// Against a reference with glossy transport, which probes do not have; absent without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_gltf: Option<ErrorReport>,
-}
-
-#[derive(Debug, Clone, Copy, Serialize)]
-pub struct Timing {
-    pub min: f64,
-    pub median: f64,
-    pub max: f64,
-    pub runs: usize,
-}
-
-impl Timing {
-    /// Of at least one value.
-    pub fn of(mut values: Vec<f64>) -> Timing {
-        values.sort_by(f64::total_cmp);
-        let at = |i: usize| values.get(i).copied().unwrap_or(f64::NAN);
-        Timing { min: at(0), median: at(values.len() / 2), max: at(values.len().saturating_sub(1)), runs: values.len() }
-    }
+    /// The light that surfaces reflect as gloss; absent where the probes hold none for it, and where the scene has no glossy
+    /// material.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub glossy: Option<GlossyReport>,
 }

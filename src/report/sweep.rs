@@ -215,6 +215,19 @@ pub struct MethodFigures {
     /// From the reference's noise.
     pub standard_error: Figures,
     pub verdict: Option<String>,
+    /// Of glossy light; `None` where the probes hold none or the scene has no glossy material.
+    #[serde(default)]
+    pub glossy: Option<GlossyFigures>,
+}
+
+/// The light that surfaces reflect as gloss.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GlossyFigures {
+    /// Median.
+    pub shade_ms: f64,
+    pub bytes_per_probe: f64,
+    /// `error_gltf.nrmse`.
+    pub error_gltf: Option<f64>,
 }
 
 /// A configuration's probes lit by full paths.

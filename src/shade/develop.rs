@@ -13,6 +13,7 @@ use crate::light::lambert::reflected_radiance;
 /// Names of the layers with variances.
 pub const BEAUTY_VARIANCE: &str = "beauty_variance";
 pub const IRRADIANCE_INDIRECT_VARIANCE: &str = "irradiance_indirect_variance";
+pub const GLOSSY_VARIANCE: &str = "glossy_variance";
 
 /// The quantities that are accumulated, by transport. `BLENDED` lists are for scenes whose pixels can show several
 /// points.
@@ -113,9 +114,11 @@ pub(super) fn develop_blended(film: &Film, width: u32, height: u32) -> LayeredIm
 
 /// Adds the layers with the accumulated variances.
 fn push_variances(film: &Film, image: &mut LayeredImage) {
-    for (quantity, name) in
-        [(Quantity::Beauty, BEAUTY_VARIANCE), (Quantity::IrradianceIndirect, IRRADIANCE_INDIRECT_VARIANCE)]
-    {
+    for (quantity, name) in [
+        (Quantity::Beauty, BEAUTY_VARIANCE),
+        (Quantity::IrradianceIndirect, IRRADIANCE_INDIRECT_VARIANCE),
+        (Quantity::Glossy, GLOSSY_VARIANCE),
+    ] {
         if let Some(variance) = film.variance(quantity) {
             image.push(name, variance);
         }

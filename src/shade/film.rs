@@ -46,7 +46,7 @@ impl Quantity {
 
     /// Whether the scatter of the blocks is accumulated.
     fn has_scatter(self) -> bool {
-        matches!(self, Quantity::IrradianceIndirect | Quantity::Beauty)
+        matches!(self, Quantity::IrradianceIndirect | Quantity::Beauty | Quantity::Glossy)
     }
 
     /// Numbers in a record.
@@ -201,7 +201,7 @@ pub fn add_block(record: &mut [f64], quantities: &[Quantity], means: &[DVec3], b
 mod tests {
     use super::*;
 
-    const QUANTITIES: &[Quantity] = &[Quantity::IrradianceIndirect, Quantity::Glossy];
+    const QUANTITIES: &[Quantity] = &[Quantity::IrradianceIndirect, Quantity::Indirect];
 
     fn film(blocks: &[[f64; 2]]) -> Film {
         let mut film = Film::new(QUANTITIES, 2);
@@ -225,8 +225,8 @@ mod tests {
         let variance = film.variance(Quantity::IrradianceIndirect).unwrap();
         assert!((variance[0] - Vec3::new(4.0 / 3.0, 4.0 / 3.0, 0.0)).length() < 1e-6, "{variance:?}");
         assert_eq!(variance[1], Vec3::ZERO);
-        assert_eq!(film.mean(Quantity::Glossy).unwrap()[0].x, 6.0);
-        assert_eq!(film.variance(Quantity::Glossy), None);
+        assert_eq!(film.mean(Quantity::Indirect).unwrap()[0].x, 6.0);
+        assert_eq!(film.variance(Quantity::Indirect), None);
         let noise = film.noise(Quantity::IrradianceIndirect).unwrap();
         assert!((noise.rms_standard_error - (8.0f64 / 3.0 / 6.0).sqrt()).abs() < 1e-9);
         assert!((noise.mean_standard_error - 2.0 * (4.0f64 / 3.0).sqrt() / 6.0).abs() < 1e-9);

@@ -16,7 +16,8 @@ use crate::probe::Volume;
 use crate::probe::file::{self, ProbeFile, SceneRecord};
 use crate::probe::query::{Query, QueryPoint};
 use crate::report::error::{ByRegion, ErrorEstimate};
-use crate::report::sweep::{BakeTimes, MethodFigures, RunRecord, TruthRecord};
+use crate::report::reference_layers::ReferenceLayers;
+use crate::report::sweep::{BakeTimes, GlossyFigures, MethodFigures, RunRecord, TruthRecord};
 use crate::shade::air::{self, Air, AirTruth};
 use crate::shade::reference::ReferenceSettings;
 use crate::shade::visibility_modes::VisibilityMode;
@@ -26,6 +27,8 @@ use crate::system::progress::Progress;
 pub struct Setting<'a, 's> {
     pub scenery: Scenery<'a, 's>,
     pub comparison: Comparison<'a>,
+    /// A reference of glossy transport, where any configuration shades gloss.
+    pub glossy: Option<&'a ReferenceLayers>,
     /// Mean of the reference that relative errors are relative to, W·m⁻²; `None` where it is black.
     pub reference_mean: Option<f64>,
     pub reference_settings: ReferenceSettings,
@@ -136,7 +139,10 @@ impl Setting<'_, '_> {
         let probes = file::read(&path)?;
         // It has served; the next run would replace it.
         let _ = std::fs::remove_file(&path);
-        let (volume, bytes_per_probe) = (probes.volume_as_planned(scene.origin_world), probes.runtime_bytes());
+        let (mut volume, bytes_per_probe) = (probes.volume_as_planned(scene.origin_world), probes.runtime_bytes());
+        if probes.query.weights.glossy.asks_levels() {
+            volume.radiance.make_levels();
+        }
         Ok(Bake { volume, bytes_per_probe, baked, probes })
     }
 
@@ -150,6 +156,14 @@ impl Setting<'_, '_> {
         for s in &mut shaded {
             s.compare(&self.comparison);
             s.compare_in_air(&air, &in_air);
+        }
+        // The file's own weights: they know the box that rays end at.
+        let query = Query { settings: &bake.probes.query.weights, ..query };
+        // The other ways of treating visibility are not asked for, and no paths for the parts of the error.
+        let [_, on, _] = &mut shaded;
+        self.scenery.shade_glossy(&query, &masks, std::slice::from_mut(on), None);
+        if let Some(layers) = self.glossy {
+            on.compare_glossy(layers, self.comparison.regions);
         }
         shaded
     }
@@ -218,6 +232,11 @@ impl Setting<'_, '_> {
             error,
             standard_error: measured.map(|m| m.standard_error).unwrap_or_default(),
             verdict: measured.and_then(|m| m.verdict).map(str::to_owned),
+            glossy: report.glossy.as_ref().map(|glossy| GlossyFigures {
+                shade_ms: glossy.shade_ms.median,
+                bytes_per_probe: glossy.bytes_per_probe,
+                error_gltf: glossy.error_gltf.as_ref().and_then(|error| error.all.figures.nrmse),
+            }),
         }
     }
 }

@@ -9,8 +9,8 @@ use lightprobe::probe::container::Container;
 use serde_json::{Value, json};
 
 use crate::common::Folder;
-use crate::made::{Made, diff, edited, failing, make, report, shift, with_pictures};
-use crate::program::scene;
+use crate::made::{Made, diff, edited, failing, make, report, shift, text, with_pictures};
+use crate::program::{scene, succeed};
 
 const ROOMS: &str = "--set grid.spacing_m=1";
 
@@ -290,4 +290,34 @@ fn a_pixel_that_is_no_number() {
     caught(&folder, &base.run, &broken, &[], "image.non_finite");
     // Not a number on both sides is no change.
     passes(&folder, &broken, &broken.join("."), &[]);
+}
+
+/// A render with the look-up of an engine is judged by that too.
+#[test]
+fn an_engine_that_leaks_more() {
+    let folder = Folder::new();
+    let (_, rooms) = rooms();
+    let (base, candidate) = (folder.path().join("base"), folder.path().join("candidate"));
+    let scene = scene("two_rooms_open");
+    let render =
+        ["render", text(&scene), text(&rooms.probes), "-q", "-o", text(&base), "--size", "96x54", "--as", "bevy"];
+    succeed(&render);
+    std::fs::create_dir(&candidate).unwrap();
+    for entry in std::fs::read_dir(&base).unwrap().map(Result::unwrap) {
+        std::fs::copy(entry.path(), candidate.join(entry.file_name())).unwrap();
+    }
+    passes(&folder, &base, &candidate, &[]);
+    let path = candidate.join("report.json");
+    let mut changed: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    let methods = changed["methods"].as_array_mut().unwrap();
+    let own = methods.iter_mut().find(|method| method["name"] == "as_bevy").unwrap();
+    let leak = own["leak"]["light"].as_f64().unwrap();
+    own["leak"]["light"] = json!(1.3 * leak + 0.01);
+    std::fs::write(&path, changed.to_string()).unwrap();
+    caught(&folder, &base, &candidate, &[], "leak.light");
+    let (_, found) = report(&diff(&folder, &base, &candidate, &[]));
+    assert_eq!(failing(&found), ["leak.light"]);
+    let gates = found["gates"].as_array().unwrap();
+    let item = gates.iter().find(|gate| gate["passed"] == false).unwrap()["item"].as_str().unwrap();
+    assert!(item.ends_with("as_bevy"), "{item}");
 }

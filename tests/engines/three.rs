@@ -3,7 +3,6 @@
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -11,41 +10,21 @@ use glam::Vec3;
 use headless_chrome::protocol::cdp::Page::CaptureScreenshotFormatOption;
 use headless_chrome::protocol::cdp::types::Event;
 use headless_chrome::{Browser, LaunchOptions, Tab};
-use lightprobe::image::LayeredImage;
 use serde_json::Value;
 use tempfile::TempDir;
 
+use crate::agree::{CAMERAS, SIZE, all_agree, baked, exported, shaded};
+use crate::album::Entry;
+use crate::mutants;
 use crate::needs::browser;
 use crate::server::Server;
 
 const PATIENCE: Duration = Duration::from_secs(120);
-const SIZE: (u32, u32) = (96, 54);
 
 /// The folder of npm's package three.
 pub fn package() -> Option<PathBuf> {
     let folder = PathBuf::from(std::env::var_os("LIGHTPROBE_THREE")?);
     folder.join("build/three.module.js").is_file().then_some(folder)
-}
-
-fn run(words: &str, paths: &[(&str, &Path)]) -> Value {
-    let word = |word: &str| match paths.iter().find(|(name, _)| *name == word) {
-        Some((_, path)) => path.to_str().expect("UTF-8").to_owned(),
-        None => word.to_owned(),
-    };
-    let mut command = Command::new(env!("CARGO_BIN_EXE_lightprobe"));
-    let output = command.args(words.split_whitespace().map(word)).args(["-q", "--json"]).output().expect("the program");
-    assert!(output.status.success(), "{words}: {}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).expect("JSON")
-}
-
-/// Two rooms with a door, fitted for three.js, in a folder.
-fn exported(folder: &Path) -> PathBuf {
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/two_rooms_open.glb");
-    let (probes, export) = (folder.join("rooms.probes"), folder.join("export"));
-    let paths = [("SCENE", &*scene), ("PROBES", &*probes), ("EXPORT", &*export)];
-    run("bake SCENE -o PROBES --set grid.spacing_m=1 --set capture.rays.octahedral.resolution=16", &paths);
-    run("export PROBES --to three -o EXPORT --scene SCENE --fit --set fit.rows.rows_per_probe=50", &paths);
-    export
 }
 
 struct Page {
@@ -119,48 +98,72 @@ fn serve(export: &Path) -> Server {
     Server::new(vec![("/node_modules/three/", three), ("/", export.to_owned()), ("/", own)])
 }
 
+/// Irradiance by three.js of an export below the page's own.
+fn picture(page: &Page, camera: &str, (width, height): (u32, u32), folder: &str, scene: &str) -> Vec<Vec3> {
+    let call = format!("irradiance('{camera}', {width}, {height}, '{folder}', '{scene}').then(JSON.stringify)");
+    let text = page.eval(&call);
+    let found: Vec<f32> = serde_json::from_str(text.as_str().expect("text")).unwrap();
+    found.as_chunks::<3>().0.iter().map(|p| Vec3::from(*p)).collect()
+}
+
+/// The same for each camera of the two rooms.
+fn pictures(page: &Page, folder: &str) -> Vec<Vec<Vec3>> {
+    CAMERAS.iter().map(|camera| picture(page, camera, SIZE, folder, "scene.glb")).collect()
+}
+
+/// The pictures of an album.
+pub fn album(entries: &[Entry]) {
+    for entry in entries {
+        let Entry { scene, export, camera, size, .. } = entry;
+        let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/engines");
+        let (folder, file) = (scene.parent().expect("a folder"), scene.file_name().and_then(OsStr::to_str));
+        let three = package().expect("these tests run where three.js is");
+        let folders =
+            vec![("/node_modules/three/", three), ("/scene/", folder.to_owned()), ("/", export.clone()), ("/", own)];
+        let server = Server::new(folders);
+        let page = Page::open(&format!("{}/compare.html", server.address));
+        page.wait_for("window.ready === true");
+        let file = format!("scene/{}", file.expect("a name"));
+        entry.judge(&picture(&page, camera, *size, "", &file));
+    }
+}
+
 pub fn pixels_of_three_are_those_of_render() {
     let folder = tempfile::tempdir().unwrap();
-    let export = exported(folder.path());
+    let probes = baked("two_rooms_open", folder.path());
+    let export = exported("two_rooms_open", &probes, "three", "--fit");
+    let (expected, unit) = shaded("two_rooms_open", &export);
+    let broken = mutants::write(&mutants::OF_THREE, &export, &export);
     let server = serve(&export);
     let page = Page::open(&format!("{}/compare.html", server.address));
     page.wait_for("window.ready === true");
-    let (width, height) = SIZE;
-    let mut unit = 0.0;
-    for camera in ["lit", "dark"] {
-        let scene = export.join("scene.glb");
-        let shaded = folder.path().join(camera);
-        let paths = [("SCENE", &*scene), ("EXPORT", &*export), ("SHADED", &*shaded)];
-        run(&format!("render SCENE EXPORT -o SHADED --camera {camera} --size {width}x{height}"), &paths);
-        let image = LayeredImage::read_exr(&shaded.join("visibility_on.exr")).unwrap();
-        let expected = image.layer("irradiance_indirect").unwrap();
-        let text = page.eval(&format!("irradiance('{camera}', {width}, {height}).then(JSON.stringify)"));
-        let found: Vec<f32> = serde_json::from_str(text.as_str().expect("text")).unwrap();
-        let found: Vec<Vec3> = found.as_chunks::<3>().0.iter().map(|p| Vec3::from(*p)).collect();
-        assert_eq!(found.len(), expected.len());
-        let mean = expected.iter().map(|e| e.element_sum() / 3.0).sum::<f32>() / expected.len() as f32;
-        // Of the lit room, whose probes those of the dark one are blended with.
-        unit = f32::max(unit, mean);
-        let mut differences: Vec<f32> =
-            found.iter().zip(expected).map(|(a, b)| (*a - *b).abs().max_element() / unit).collect();
-        differences.sort_by(f32::total_cmp);
-        let at = |share: f64| differences[(share * (differences.len() - 1) as f64) as usize];
-        eprintln!(
-            "{camera}: mean {mean}, differences ÷ {unit}: median {}, 97 % {}, most {}",
-            at(0.5),
-            at(0.97),
-            at(1.0)
-        );
-        // Textures are filtered with fractions of eight bits: 1/256 of the difference between neighbours, which is as large
-        // as the light. Pixels on edges may show the other surface, as both draw through nearly the same points: few do.
-        assert!(mean > 0.0 && at(0.5) < 0.002 && at(0.97) < 0.01, "{camera}: {} {}", at(0.5), at(0.97));
+    assert!(all_agree("three", &pictures(&page, ""), &expected, unit));
+    for (mutant, folder) in mutants::OF_THREE.iter().zip(broken) {
+        let name = folder.file_name().and_then(|name| name.to_str()).expect("a name").to_owned();
+        let found = pictures(&page, &format!("{name}/"));
+        assert!(!all_agree(&format!("three, {}", mutant.name), &found, &expected, unit), "nobody notices");
     }
     assert!(server.missed.lock().unwrap().is_empty(), "{:?}", server.missed.lock().unwrap());
 }
 
+pub fn several_volumes_in_three_are_those_of_render() {
+    let folder = tempfile::tempdir().unwrap();
+    let probes = baked("two_rooms_open", folder.path());
+    let export = exported("two_rooms_open", &probes, "three", "--fit --volumes auto");
+    let (expected, unit) = shaded("two_rooms_open", &export);
+    mutants::write_reversed(&export, &export);
+    let server = serve(&export);
+    let page = Page::open(&format!("{}/compare.html", server.address));
+    page.wait_for("window.ready === true");
+    assert!(all_agree("three, volumes auto", &pictures(&page, ""), &expected, unit));
+    let found = pictures(&page, "reversed/");
+    assert!(!all_agree("three, volumes in the opposite order", &found, &expected, unit), "nobody notices");
+}
+
 pub fn the_exported_page_shows_the_scene() {
     let folder = tempfile::tempdir().unwrap();
-    let export = exported(folder.path());
+    let probes = baked("two_rooms_open", folder.path());
+    let export = exported("two_rooms_open", &probes, "three", "--fit");
     let server = serve(&export);
     let page = Page::open(&format!("{}/index.html", server.address));
     page.wait_for("document.getElementById('message').textContent !== 'loading'");

@@ -19,6 +19,7 @@ fn mistakes_are_told_with_what_was_meant() {
         (&["render", probes, rooms, "-o", output][..], &["render SCENE PROBES", "is a probe file"][..]),
         (&["render", rooms, rooms, "-o", output], &["is a scene", "render SCENE PROBES"]),
         (&["bake", probes, "-o", output], &["is a probe file"]),
+        (&["view", probes, rooms, "-o", output], &["view SCENE PROBES"]),
         (&["inspect", rooms], &["is a scene", "inspect PROBES"]),
         (&["export", rooms, "--to", "three", "-o", output], &["is a scene", "export PROBES"]),
         (&["convert", rooms, probes, "-o", output, "--to", "uniform"], &["is a scene", "convert PROBES SCENE"]),
@@ -85,7 +86,7 @@ fn probes_stand_close_where_the_content_is_small() {
     let output = folder.path().join("field.probes");
     let run = succeed(&["bake", text(&field), "-o", text(&output), "--dry-run", "--json", "-v"]);
     assert!(run.stderr.contains("warning: the scene is 60.0 m long"), "{}", run.stderr);
-    // 60 m ÷ 16 would be 3.75 m: not one probe in the room. At most 16,384 probes cover 60 × 60 × 2 m from 0.78 m on.
+    // 60 m ÷ 16 would be 3.75 m: not one probe in the room. At most 16,384 probes cover 60 × 60 × 2 m from 0.97 m on.
     let probes = run.json()["probes"].as_u64().unwrap();
     assert!((8_000..=16_384).contains(&probes), "{probes}");
     // A scene that fills its box has the spacing that it always had.

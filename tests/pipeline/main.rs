@@ -16,6 +16,7 @@ mod exporting;
 mod first_hour;
 mod fitting;
 mod furnace;
+mod glossy;
 mod interrupted;
 mod layers;
 mod leaks;

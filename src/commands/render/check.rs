@@ -33,6 +33,7 @@ const PICTURES: &[&str] = &[
     "visibility_on.png",
     "visibility_ray.exr",
     "visibility_ray.png",
+    "glossy.png",
     "leak.exr",
     "leak.png",
     "probes.png",

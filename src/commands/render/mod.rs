@@ -88,11 +88,16 @@ pub fn run(args: &RenderArgs, console: &Console) -> Result<()> {
     }
     let probes = file::read(&args.probes)?;
     let origin = Probes::of(&args.probes, &probes, args.allow_scene_change);
-    let session = Session::open(opening(args, probes.query.light, origin), console)?;
+    let shows_gloss = !probes.query.weights.glossy.is_none();
+    let detail = if shows_gloss { Detail::GLOSSY } else { Detail::PICTURE };
+    let session = Session::open(opening(args, probes.query.light, origin, detail), console)?;
     let (world, accel_build_s) = session.world()?;
     tell::probes(console, &args.probes, &probes);
     let cameras = prepare(args, &session, &world)?;
-    let volume = probes.volume_as_planned(session.scene.origin_world);
+    let mut volume = probes.volume_as_planned(session.scene.origin_world);
+    if probes.query.weights.glossy.asks_levels() {
+        volume.radiance.make_levels();
+    }
     let truth = args.bake_error.then(|| truth(args, &session, &world, &probes, &volume));
     let settings = &probes.query.weights;
     let shown = Shown {
@@ -145,7 +150,7 @@ fn run_export(args: &RenderArgs, reference: Option<Source>, console: &Console) -
         environment: record.environment.as_deref(),
         allow_change: args.allow_scene_change,
     };
-    let session = Session::open(opening(args, record.light, origin), console)?;
+    let session = Session::open(opening(args, record.light, origin, Detail::PICTURE), console)?;
     let (world, accel_build_s) = session.world()?;
     let cameras = prepare(args, &session, &world)?;
     let written = written.relative_to(session.scene.origin_world);
@@ -199,13 +204,13 @@ fn finish<A: Answers>(run: &Run<A>, cameras: &[Camera]) -> Result<()> {
     }
 }
 
-fn opening<'a>(args: &'a RenderArgs, light: LightRecord, probes: Probes<'a>) -> Opening<'a> {
+fn opening<'a>(args: &'a RenderArgs, light: LightRecord, probes: Probes<'a>, detail: Detail) -> Opening<'a> {
     Opening {
         scene: &args.scene,
         trace: &args.trace,
         light,
         probes: Some(probes),
-        detail: Detail::PICTURE,
+        detail,
         keep_images: false,
         inputs: vec![Named::new("the probe file", &args.probes)],
         // Each camera has pictures of its own, in a folder of its own.
@@ -266,6 +271,7 @@ fn render_camera<A: Answers>(run: &Run<A>, camera: &Camera, folder: &Path) -> Re
     });
     let of_engine =
         |(to, written, bytes): &(Target, Written, f64)| scenery.shade_as(written, to.method(), &air, *bytes);
+    let mut by_rays = scenery.shade_diffuse_rays(query, &masks, &shaded[1]);
     let mut as_engine = probes.also.as_ref().map(of_engine);
     let fitted = probes.is_fitted;
     let baked = run.truth.as_ref().filter(|_| !fitted).map(|t| t.report.clone());
@@ -276,8 +282,9 @@ fn render_camera<A: Answers>(run: &Run<A>, camera: &Camera, folder: &Path) -> Re
     let shot = Shot { session, world: run.world, camera, view: &view };
     let reference = Reference::obtain(run.reference.as_ref(), shot, args.allow_scene_change)?;
     let exposure_ev = args.exposure.unwrap_or_else(|| exposure(&shaded[2], reference.as_ref()));
+    scenery.shade_glossy(query, &masks, &mut shaded, reference.as_ref().and_then(Reference::glossy_layers));
     if let Some(reference) = &reference {
-        let all = shaded.iter_mut().chain(&mut path_traced).chain(&mut as_engine);
+        let all = shaded.iter_mut().chain(&mut path_traced).chain(&mut by_rays).chain(&mut as_engine);
         compare(session, reference, exposure_ev, all);
     }
     if let Some(spp) = args.reference {
@@ -314,11 +321,12 @@ fn render_camera<A: Answers>(run: &Run<A>, camera: &Camera, folder: &Path) -> Re
         fitted,
         baked_reason: (fitted && run.truth.is_some()).then_some(baked::FITTED),
         export: probes.export.map(Target::name),
-        methods: shaded.into_iter().chain(path_traced).chain(as_engine).map(|s| s.report).collect(),
+        methods: shaded.into_iter().chain(path_traced).chain(by_rays).chain(as_engine).map(|s| s.report).collect(),
     };
     write_json(&folder.join(REPORT), &report)?;
     tell::rendered(session.console, &report);
-    pictures(args, folder).iter().for_each(|picture| tell::written(session.console, &picture.path));
+    let written = pictures(args, folder).into_iter().filter(|picture| picture.path.exists());
+    written.for_each(|picture| tell::written(session.console, &picture.path));
     Ok(report)
 }
 

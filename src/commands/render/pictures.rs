@@ -42,6 +42,9 @@ pub fn write(
         s.image.write_exr(&file(s.report.name, "exr"))?;
         tonemapped(&s.image).write_png(&file(s.report.name, "png"))?;
     }
+    if let Some(picture) = shaded[1].image.picture("beauty_gltf") {
+        picture.tonemapped(exposure_ev).write_png(&file("glossy", "png"))?;
+    }
     let [off, on, exact] = shaded;
     let difference = |s: &Shaded| {
         let signed = |i: usize| Vec3::splat(luminance(s.irradiance[i]) - luminance(exact.irradiance[i]));

@@ -74,6 +74,8 @@ pub struct Reference {
     pub summary: ReferenceSummary,
     /// Whether its surfaces are glossy, as those of probes are not.
     pub glossy: bool,
+    /// What these surfaces reflect as gloss, where the reference says it.
+    gloss: Option<ReferenceLayers>,
     provenance: Provenance,
 }
 
@@ -98,7 +100,9 @@ impl Reference {
                 let summary = ReferenceSummary { file: Some(path.display().to_string()), ..Default::default() };
                 let summary = ReferenceSummary { spp: spp_of(image), ..summary };
                 let glossy = image.texts.get("transport").is_some_and(|t| t == "gltf");
-                Some(Reference::new(shot, layers.clone(), summary, glossy, Provenance::File(path.clone())))
+                let gloss = ReferenceLayers::of_glossy(image, spp_of(image).map(|spp| spp / BLOCK)).filter(|_| glossy);
+                let reference = Reference::new(shot, layers.clone(), summary, glossy, Provenance::File(path.clone()));
+                Some(Reference { gloss, ..reference })
             }
         })
     }
@@ -127,7 +131,14 @@ impl Reference {
         let regions = regions(shot.world, shot.view);
         let (irradiance_indirect_mean, standard_error_mean) = layers.means(|i| regions[i].is_some());
         let summary = ReferenceSummary { irradiance_indirect_mean, standard_error_mean, ..summary };
-        Reference { layers, regions, summary, glossy, provenance }
+        Reference { layers, regions, summary, glossy, gloss: None, provenance }
+    }
+
+    /// What is reflected as gloss, the regions of the pixels, and samples a pixel; `None` where the reference does not say it.
+    pub fn glossy_layers(&self) -> Option<(&ReferenceLayers, &[Option<Region>], u32)> {
+        /// Where a file does not say.
+        const SPP: u32 = 256;
+        self.gloss.as_ref().map(|layers| (layers, self.regions.as_slice(), self.summary.spp.unwrap_or(SPP)))
     }
 
     /// Writes all that there is of the reference. A file is copied as it is, with what else it holds; onto itself it stays.

@@ -78,7 +78,10 @@ pub fn table(report: &RenderReport) -> String {
     let baked = report.baked.as_ref().filter(|b| b.figures.bias.is_some()).map(baked_line);
     let fitted = report.fitted.then(|| unfit_line(report));
     let reason = report.baked_reason.map(|reason| format!("no figure of the bake itself: {reason}"));
-    for line in points.into_iter().chain(fitted).chain(error_lines(report, mean)).chain(baked).chain(reason) {
+    let gloss: Vec<String> = report.methods.iter().filter_map(glossy_line).collect();
+    let lines =
+        points.into_iter().chain(fitted).chain(gloss).chain(error_lines(report, mean)).chain(baked).chain(reason);
+    for line in lines {
         text.push('\n');
         text.push_str(&line);
     }
@@ -147,6 +150,37 @@ fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {
     lines.push(format!("corners are {} of the picture's surfaces", format::percent(share)));
     lines.extend(verdicts(&errors));
     lines
+}
+
+/// What a method's gloss costs and how far it is off; `None` where it has none.
+fn glossy_line(method: &MethodReport) -> Option<String> {
+    let glossy = method.glossy.as_ref()?;
+    let error = glossy.error_gltf.as_ref().map_or_else(String::new, |error| {
+        let parts: Vec<String> = glossy
+            .parts
+            .iter()
+            .map(|part| format!("{} {}", part.name.replace('_', " "), relative_rmse(&part.error_gltf.all)))
+            .collect();
+        let parts = if parts.is_empty() { String::new() } else { format!(" ({})", parts.join(", ")) };
+        format!(", error_gltf {}{parts}", relative_rmse(&error.all))
+    });
+    let traced = glossy.traced.map_or_else(String::new, |traced| {
+        format!(
+            ", {} probes and {} map reads a ray, {} of the rays lost",
+            format::significant(traced.probes, 3),
+            format::significant(traced.reads, 3),
+            format::percent(traced.lost)
+        )
+    });
+    Some(format!(
+        "{} glossy: {} in {}, {} a probe{traced}{error}",
+        label(method),
+        glossy
+            .radiance_mean
+            .map_or(format::UNDEFINED.to_owned(), |l| format!("{} W·m⁻²·sr⁻¹", format::significant(l, 4))),
+        format::seconds(glossy.shade_ms.median / 1e3),
+        format::bytes(glossy.bytes_per_probe.round() as u64),
+    ))
 }
 
 /// What is wrong with the probes themselves.

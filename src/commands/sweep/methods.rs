@@ -79,6 +79,11 @@ pub fn shared(ladders: &[Ladder]) -> Result<(&Config, bool)> {
     Ok((first, configs().any(|config| config.plan.keeps_everything())))
 }
 
+/// Whether any configuration shades glossy surfaces.
+pub fn shades_gloss(ladders: &[Ladder]) -> bool {
+    ladders.iter().flat_map(|ladder| &ladder.rungs).any(|rung| !rung.config.query.glossy.is_none())
+}
+
 /// Shifts the grids by `--offsets`; the shifts.
 pub fn shift(args: &SweepArgs, ladders: &mut [Ladder], scene: &Scene) -> Result<Vec<[f64; 3]>, SweepError> {
     let Some(count) = args.offsets else { return Ok(Vec::new()) };

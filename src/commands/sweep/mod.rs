@@ -13,13 +13,15 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 
-use self::methods::{check_all, configurations, ladders, shared, shift, wants_floors};
+use self::methods::{check_all, configurations, ladders, shades_gloss, shared, shift, wants_floors};
 use self::work::Work;
 use super::camera::cameras;
 use super::session::{Opening, Session, list_presets, lists_presets};
 use super::{Console, check_picture_memory, tell};
 use crate::cli::SweepArgs;
 use crate::evaluate::{Comparison, Scenery};
+use crate::light::bsdf::ReflectionModel;
+use crate::plan::glossy_materials;
 use crate::report::sweep::SweepTimes;
 use crate::scene::Detail;
 use crate::shade::points::see;
@@ -51,7 +53,7 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
         trace: &args.trace,
         light: config.light(),
         probes: None,
-        detail: Detail::PICTURE,
+        detail: if shades_gloss(&ladders) { Detail::GLOSSY } else { Detail::PICTURE },
         keep_images,
         inputs: configurations(args, file.as_ref()),
         // In a folder that does not exist nothing is in the way.
@@ -69,6 +71,9 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
     create_folder(&args.output)?;
     let settings = ReferenceSettings { spp: args.reference, seed: session.seed, ..Default::default() };
     let reference = reference::obtain(args, &world, &camera, &settings, console)?;
+    let has_gloss = shades_gloss(&ladders) && glossy_materials(world.scene) > 0;
+    let gltf = ReferenceSettings { transport: ReflectionModel::Gltf, ..settings };
+    let glossy = has_gloss.then(|| reference::obtain(args, &world, &camera, &gltf, console)).transpose()?;
     let primary_started = Instant::now();
     let view = see(&world, &camera, args.view.size.width, args.view.size.height, session.seed);
     let primary_s = primary_started.elapsed().as_secs_f64();
@@ -85,6 +90,7 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
             exposure_ev,
             seed: session.seed,
         },
+        glossy: glossy.as_ref().and_then(|reference| reference.glossy.as_ref()),
         reference_mean: mean.filter(|mean| *mean > 0.0),
         reference_settings: ReferenceSettings { spp: reference.spp, ..settings },
         store: Store::new(&args.output)?,
@@ -112,7 +118,7 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
         times: SweepTimes {
             load: session.load_s,
             accel_build: accel_build_s,
-            reference: reference.time_s.unwrap_or(0.0),
+            reference: reference.time_s.unwrap_or(0.0) + glossy.as_ref().and_then(|r| r.time_s).unwrap_or(0.0),
             total: session.elapsed_s(),
         },
         offsets,
@@ -125,7 +131,7 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
     contact.write_png(&args.output.join(sheet::FILE))?;
     let seen = page::Seen { scenery: &setting.scenery, reference: &reference.layers, regions: &regions, exposure_ev };
     page::write(&report, &seen, &irradiance, &args.output)?;
-    outputs.iter().for_each(|output| tell::written(console, &output.path));
+    outputs.iter().filter(|o| o.path.exists()).for_each(|output| tell::written(console, &output.path));
     let kept = format::counted(work.kept as u64, "run", "runs");
     let from_before = if work.kept > 0 { format!(", {kept} kept from before") } else { String::new() };
     session.print(&report, || format!("{}\nwrote {}{from_before}", table::text(&report), args.output.display()))

@@ -13,6 +13,7 @@ use crate::system::output::write_atomically;
 /// All that a sweep's folder gets besides its runs.
 pub const FILES: &[&str] = &[
     super::reference::FILE,
+    super::reference::GLTF_FILE,
     super::sheet::FILE,
     super::page::FILE,
     "sweep.json",
@@ -90,6 +91,9 @@ fn csv(report: &SweepReport) -> Result<Vec<u8>> {
                 ("error_mae", number(e.mae)),
                 ("error_bias", number(e.bias)),
                 ("error_flip", number(e.flip)),
+                ("error_gltf", number(m.glossy.and_then(|glossy| glossy.error_gltf))),
+                ("glossy_shade_ms", number(m.glossy.map(|glossy| glossy.shade_ms))),
+                ("glossy_bytes_per_probe", number(m.glossy.map(|glossy| glossy.bytes_per_probe))),
             ];
             if !std::mem::replace(&mut has_head, true) {
                 writer.write_record(cells.each_ref().map(|(name, _)| *name))?;

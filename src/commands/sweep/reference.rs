@@ -8,6 +8,7 @@ use crate::cli::SweepArgs;
 use crate::commands::reference::{LAYERED_PIXEL_BYTES, PIXEL_BYTES, trace};
 use crate::commands::{Console, check_picture_memory, tell};
 use crate::light::World;
+use crate::light::bsdf::ReflectionModel;
 use crate::math::blocks::BLOCK;
 use crate::report::reference_layers::ReferenceLayers;
 use crate::report::render::ReferenceSummary;
@@ -19,8 +20,13 @@ use crate::shade::reference_file::{Identity, resume};
 /// Its name in the folder.
 pub const FILE: &str = "reference.exr";
 
+/// The same of glossy transport, where any configuration shades gloss.
+pub const GLTF_FILE: &str = "reference_gltf.exr";
+
 pub struct SharedReference {
     pub layers: ReferenceLayers,
+    /// What its surfaces reflect as gloss, where its transport is glossy.
+    pub glossy: Option<ReferenceLayers>,
     pub identity: Identity,
     /// Samples per pixel that it has.
     pub spp: u32,
@@ -48,7 +54,8 @@ pub fn obtain(
     settings: &ReferenceSettings,
     console: &Console,
 ) -> Result<SharedReference> {
-    let (size, path) = (args.view.size, args.output.join(FILE));
+    let name = if settings.transport == ReflectionModel::Gltf { GLTF_FILE } else { FILE };
+    let (size, path) = (args.view.size, args.output.join(name));
     check_picture_memory(size, if has_blend(world) { LAYERED_PIXEL_BYTES } else { PIXEL_BYTES })?;
     let identity = Identity::new(world, camera, size.width, size.height, settings);
     let mut previous = None;
@@ -71,6 +78,7 @@ pub fn obtain(
         reference.write(&path, &identity)?;
     }
     let layers = ReferenceLayers::new(&reference.image, (size.width, size.height), Some(reference.spp / BLOCK))?;
+    let glossy = ReferenceLayers::of_glossy(&reference.image, Some(reference.spp / BLOCK));
     let time_s = new.then(|| started.elapsed().as_secs_f64());
-    Ok(SharedReference { layers, identity, spp: reference.spp, time_s })
+    Ok(SharedReference { layers, glossy, identity, spp: reference.spp, time_s })
 }

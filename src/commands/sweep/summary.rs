@@ -56,6 +56,9 @@ const FIGURES: &[(&str, Figure)] = &[
     ("error_relmse", |_, m| m.error.relmse),
     ("error_bias", |_, m| m.error.bias),
     ("error_flip", |_, m| m.error.flip),
+    ("error_gltf", |_, m| m.glossy?.error_gltf),
+    ("glossy_shade_ms", |_, m| m.glossy.map(|glossy| glossy.shade_ms)),
+    ("glossy_bytes_per_probe", |_, m| m.glossy.map(|glossy| glossy.bytes_per_probe)),
 ];
 
 impl Outcome {

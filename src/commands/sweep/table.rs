@@ -45,9 +45,15 @@ fn is_comparison(report: &SweepReport) -> bool {
     report.ladders.iter().all(|ladder| ladder.configurations.len() == 1)
 }
 
+fn typical(configuration: &ConfigurationReport, figure: &str) -> Option<f64> {
+    configuration.figures.get(figure).and_then(Aggregate::typical)
+}
+
 /// A row for each method.
 fn comparison(report: &SweepReport) -> String {
-    let mut table = Table::new(&[
+    let has_gloss = report.configurations.iter().any(|c| typical(c, "glossy_shade_ms").is_some());
+    let gloss = [("error_gltf", Column::Number), ("gloss shade", Column::Number), ("gloss per probe", Column::Number)];
+    let columns = [
         ("method", Column::Text),
         ("probes", Column::Number),
         ("error", Column::Number),
@@ -62,11 +68,13 @@ fn comparison(report: &SweepReport) -> String {
         ("bake", Column::Number),
         ("shade", Column::Number),
         ("memory per probe", Column::Number),
-    ]);
+    ];
+    let shown = if has_gloss { &gloss[..] } else { &[] };
+    let mut table = Table::new(&[&columns[..], shown].concat());
     for c in &report.configurations {
-        let typical = |figure: &str| c.figures.get(figure).and_then(Aggregate::typical);
+        let typical = |figure: &str| typical(c, figure);
         let share = |figure: &str| percent(typical(figure));
-        table.push([
+        let mut cells = vec![
             c.label.clone(),
             c.probes.to_string(),
             error(c),
@@ -81,7 +89,13 @@ fn comparison(report: &SweepReport) -> String {
             format::or_undefined(typical("bake_s"), format::seconds),
             format::or_undefined(typical("shade_ms"), |ms| format::seconds(ms / 1e3)),
             format::or_undefined(typical("bytes_per_probe"), |b| format::bytes(b.round() as u64)),
-        ]);
+        ];
+        if has_gloss {
+            cells.push(share("error_gltf"));
+            cells.push(format::or_undefined(typical("glossy_shade_ms"), |ms| format::seconds(ms / 1e3)));
+            cells.push(format::or_undefined(typical("glossy_bytes_per_probe"), |b| format::bytes(b.round() as u64)));
+        }
+        table.push(cells);
     }
     table.to_string()
 }

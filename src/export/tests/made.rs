@@ -36,7 +36,7 @@ fn holes_get_what_the_look_up_gives_around_them() {
     own.states[13] = ProbeState::InsideGeometry;
     own.positions[0] += Vec3::new(0.5, 0.0, 0.0);
     for rules in [Rules::Three, Rules::Bevy] {
-        let (grids, notes) = one_block(&own, &untested(), rules);
+        let (grids, notes) = one_block(&own, &untested(), rules, None);
         let moved: Vec<(u32, [f32; 3])> = notes[0].moved.iter().map(|moved| (moved.probe, moved.offset)).collect();
         assert_eq!((&notes[0].holes[..], &moved[..]), (&[13][..], &[(0, [0.5, 0.0, 0.0])][..]));
         for (hole, neighbour) in grids.of_probe(13).iter().zip(grids.of_probe(12)) {
@@ -47,7 +47,7 @@ fn holes_get_what_the_look_up_gives_around_them() {
     // Where nothing is known around, the nearest counts.
     let mut lone = volume(UVec3::new(4, 1, 1), |_| 3.0);
     lone.states[1..].fill(ProbeState::InsideGeometry);
-    let (grids, _) = one_block(&lone, &untested(), Rules::Three);
+    let (grids, _) = one_block(&lone, &untested(), Rules::Three, None);
     assert!((grids.of_probe(3)[0].x - 3.0).abs() < 1e-4);
 }
 
@@ -56,7 +56,7 @@ fn what_is_written_answers_as_the_volume_does() {
     let own = volume(UVec3::new(3, 4, 2), |probe| 1.0 + probe as f32);
     let settings = untested();
     let query = Query { volume: &own, settings: &settings };
-    let (grids, notes) = one_block(&own, &settings, Rules::Three);
+    let (grids, notes) = one_block(&own, &settings, Rules::Three, None);
     let made = Export::of_grids(&grids, &notes, &origin(), None);
     let folder = tempfile::tempdir().unwrap();
     made.write(folder.path()).unwrap();

@@ -54,8 +54,27 @@ fn closed_rooms_get_a_volume_each() {
     let (scene, own) = in_scene("two_rooms_sealed", 0.8);
     let world = World::new(&scene, 1.0, 0.9).unwrap();
     assert!(rooms::shared(&world, &own).is_some_and(|warning| warning.contains("two rooms")));
-    let open = rooms_of("two_rooms_open");
-    assert_eq!(open.len(), 1, "one room through the door: {open:?}");
+}
+
+#[test]
+fn rooms_end_at_doors_which_get_a_volume_of_their_own() {
+    let (scene, own) = in_scene("two_rooms_open", 0.8);
+    let world = World::new(&scene, 1.0, 0.9).unwrap();
+    let open = rooms::rooms(&world, &own);
+    let [a, b] = open[..] else { panic!("two rooms: {open:?}") };
+    for room in [a, b] {
+        assert!((room.high - room.low - Vec3::new(4.0, 3.0, 4.0)).abs().max_element() < 2e-4, "{room:?}");
+    }
+    let spacing = own.grid.spacing();
+    let openings = rooms::openings(&world, &open, spacing);
+    let [door] = openings[..] else { panic!("one opening: {openings:?}") };
+    // The wall of 0.1 m ends 1.2 m before the side wall, from floor to ceiling; rays stand an eighth of a spacing apart.
+    let (left, right) = if a.low.x < b.low.x { (a, b) } else { (b, a) };
+    let step = spacing / 8.0;
+    let size = door.high - door.low;
+    assert!((size.x - (2.0 * spacing.x + 0.1)).abs() < 1e-3 && (size.y - 3.0).abs() < step.y, "{door:?}");
+    assert!((1.199..1.2 + 2.0 * step.z).contains(&size.z), "{door:?}");
+    assert!(left.high.x - door.low.x > 0.0 && door.high.x - right.low.x > 0.0, "{door:?}");
 }
 
 #[test]

@@ -41,7 +41,7 @@ fn capture<'a>(
 }
 
 fn octahedral(resolution: usize, per_texel: usize) -> Rays {
-    Rays::Octahedral(OctahedralRays { resolution, per_texel, guided: 0.0 })
+    Rays::Octahedral(OctahedralRays { resolution, per_texel, guided: 0.0, centred: false })
 }
 
 /// What a capture's texels hold of light and of albedo.

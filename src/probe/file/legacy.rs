@@ -4,8 +4,10 @@
 use ron::extensions::Extensions;
 use serde::Deserialize;
 
-use super::record::{LightRecord, QUERY_VERSION, QueryRecord};
-use crate::probe::query::{BiasSpacing, Blend, DirectionWeight, LookUp, QuerySettings, VisibilityTest, WeightNormal};
+use super::record::{LightRecord, PLAIN_VERSION, QueryRecord};
+use crate::probe::query::{
+    BiasSpacing, Blend, Diffuse, DirectionWeight, Glossy, LookUp, QuerySettings, VisibilityTest, WeightNormal,
+};
 use crate::probe::store::surface::TableTest;
 use crate::scene::Unassigned;
 
@@ -129,7 +131,7 @@ pub fn query(config: &str) -> Result<QueryRecord, String> {
     };
     let bias = |bias: f32| if sees_bias { bias } else { 0.0 };
     Ok(QueryRecord {
-        version: QUERY_VERSION,
+        version: PLAIN_VERSION,
         weights: QuerySettings {
             direction: match q.direction {
                 OldDirection::Uniform => DirectionWeight::Uniform,
@@ -153,6 +155,9 @@ pub fn query(config: &str) -> Result<QueryRecord, String> {
             blank_below: 0.0,
             sum_floor: 0.0,
             look_up: LookUp::Normal,
+            least_weight: 0.0,
+            glossy: Glossy::None,
+            diffuse: Diffuse::Stored,
         },
         moved: old.placement.relocate,
         light: LightRecord {

@@ -107,7 +107,7 @@ pub fn encode(volume: &Volume, provenance: &Provenance) -> (Container, EncodingL
     }
     container.metadata.insert("format".to_owned(), FORMAT.to_owned());
     container.metadata.insert("config".to_owned(), provenance.config.to_owned());
-    container.put_json("query", provenance.query);
+    container.put_json("query", &provenance.query.to_json());
     container.put_json("scene", provenance.scene);
     container.put_json("seed", &provenance.seed);
     container.put_json("plan", provenance.plan);

@@ -41,8 +41,15 @@ pub struct SceneRecord {
 
 /// Version of the metadata key `query` that this program writes. A change of what a look-up does raises it.
 /// 2 added `light.unassigned`; 3 added to `weights` `weight_normal`, `look_up`, `bias_spacing`, `distance_bias` and
-/// `blank_below`; 4 added visibility as trees, which tests ask without settings, and `sum_floor`; 5 added thin walls to the trees.
-pub const QUERY_VERSION: u32 = 5;
+/// `blank_below`; 4 added visibility as trees, which tests ask without settings, and `sum_floor`; 5 added thin walls to the trees;
+/// 6 added to `weights` `least_weight`, `glossy` and `diffuse`.
+pub const QUERY_VERSION: u32 = 6;
+
+/// The version of records without what version 6 added, which are written as they always were.
+pub(super) const PLAIN_VERSION: u32 = 5;
+
+/// Keys of `weights` that version 6 added.
+const ADDED: &[&str] = &["least_weight", "glossy", "diffuse"];
 
 /// The metadata key `query`: all that a look-up and the shading around it need beside the tensors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -75,6 +82,24 @@ fn of_old_files() -> Unassigned {
 }
 
 impl QueryRecord {
+    /// The version that look-ups with these weights need.
+    pub fn version_of(weights: &QuerySettings) -> u32 {
+        let plain = weights.glossy.is_none() && weights.diffuse.traced().is_none() && weights.least_weight == 0.0;
+        if plain { PLAIN_VERSION } else { QUERY_VERSION }
+    }
+
+    /// As it stands in a file, without what its version does not have.
+    pub fn to_json(&self) -> Value {
+        // A plain record of numbers and enums: nothing in it can fail to serialise.
+        let mut record = serde_json::to_value(self).unwrap_or_default();
+        if self.version < QUERY_VERSION
+            && let Some(weights) = record["weights"].as_object_mut()
+        {
+            ADDED.iter().for_each(|key| drop(weights.remove(*key)));
+        }
+        record
+    }
+
     /// Refuses weights that no configuration could have asked for, and a test that the file's tensors do not fit.
     ///
     /// # Errors

@@ -94,6 +94,17 @@ impl GridSettings {
         Ok(self.layout(scene, 1)?.spacing.max_element())
     }
 
+    /// The box that the probes are to cover, without padding, world space, metres.
+    pub fn bounds_in(&self, scene: &Scene) -> (DVec3, DVec3) {
+        match self.bounds {
+            Some(bounds) => (DVec3::from(bounds.min), DVec3::from(bounds.max)),
+            None => {
+                let (low, high) = scene_bounds(scene);
+                (low + scene.origin_world, high + scene.origin_world)
+            }
+        }
+    }
+
     /// The spacing that is chosen where these settings leave it open; `None` where they do not.
     pub fn automatic(&self, scene: &Scene) -> Option<Automatic> {
         if self.spacing_m.is_some() || self.divisions.is_some() {

@@ -32,6 +32,16 @@ pub trait Answers: Sync {
     /// Whether it knows of any probe that a point does not see. Where it does not, light that comes through walls is its own
     /// rule, and a fit has to reckon with it.
     fn knows_walls(&self) -> bool;
+
+    /// The probes themselves, where they hold light for glossy surfaces.
+    fn glossy(&self) -> Option<Query<'_>> {
+        None
+    }
+
+    /// The same where rays are traced in them for irradiance.
+    fn diffuse_rays(&self) -> Option<Query<'_>> {
+        None
+    }
 }
 
 impl Answers for Query<'_> {
@@ -70,6 +80,15 @@ impl Answers for Query<'_> {
     fn knows_walls(&self) -> bool {
         true
     }
+
+    fn glossy(&self) -> Option<Query<'_>> {
+        let answers = self.tracing().is_some() || !self.volume.radiance.prefiltered.is_empty();
+        (!self.settings.glossy.is_none() && answers).then_some(*self)
+    }
+
+    fn diffuse_rays(&self) -> Option<Query<'_>> {
+        self.diffuse_tracing().is_some().then_some(*self)
+    }
 }
 
 /// What is lent answers as what it is.
@@ -104,5 +123,13 @@ impl<A: Answers> Answers for &A {
 
     fn knows_walls(&self) -> bool {
         (*self).knows_walls()
+    }
+
+    fn glossy(&self) -> Option<Query<'_>> {
+        (*self).glossy()
+    }
+
+    fn diffuse_rays(&self) -> Option<Query<'_>> {
+        (*self).diffuse_rays()
     }
 }

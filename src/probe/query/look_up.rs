@@ -124,7 +124,8 @@ impl<'v> Query<'v> {
         }
         let trilinear = floored_trilinear(cell.fraction, settings.trilinear_floor);
         for (i, &probe) in out.probes.iter().enumerate() {
-            if trilinear[i] <= 0.0 || seen.mask >> i & 1 == 0 || !volume.is_active(probe) {
+            let is_nothing = trilinear[i] <= 0.0 && settings.least_weight == 0.0;
+            if is_nothing || seen.mask >> i & 1 == 0 || !volume.is_active(probe) {
                 continue;
             }
             let to_probe = || (volume.position(probe) - point.position).normalize_or_zero();
@@ -134,7 +135,7 @@ impl<'v> Query<'v> {
             if weight < settings.crush_below {
                 weight *= (weight / settings.crush_below).powi(2);
             }
-            out.weights[i] = weight * trilinear[i];
+            out.weights[i] = (weight * trilinear[i]).max(settings.least_weight);
         }
         if settings.blank_below > 0.0 && out.weights.iter().all(|w| *w < settings.blank_below) {
             out.weights = [0.0; 8];

@@ -9,15 +9,21 @@
 
 mod answers;
 mod corner_test;
+pub mod glossy;
 mod look_up;
+pub mod march;
 mod point;
+mod prefiltered;
 mod settings;
 mod shader;
 #[cfg(test)]
 mod tests;
+pub mod trace;
 
 pub use self::answers::Answers;
+pub use self::glossy::{Diffuse, Glossy, Parallax};
 pub use self::look_up::{Query, trilinear};
 pub use self::point::{CornerWeights, Part, QueryPoint, Visibility};
+pub use self::prefiltered::Source;
 pub use self::settings::{BiasSpacing, Blend, DirectionWeight, LookUp, QuerySettings, VisibilityTest, WeightNormal};
 pub use self::shader::{LOOK_UP, Shader};

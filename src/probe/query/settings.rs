@@ -3,6 +3,7 @@
 use glam::Vec3A;
 use serde::{Deserialize, Serialize};
 
+use super::glossy::{Diffuse, Glossy};
 use crate::probe::lattice::Grid;
 use crate::probe::store::OcclusionStore;
 use crate::probe::store::surface::{MAX_VOXELS_PER_CELL, TableTest};
@@ -39,6 +40,12 @@ pub struct QuerySettings {
     pub sum_floor: f32,
     /// The direction that probes' irradiance is looked up around.
     pub look_up: LookUp,
+    /// Smallest weight of a probe in all, before weights are normalised.
+    pub least_weight: f32,
+    /// Where glossy surfaces find their light.
+    pub glossy: Glossy,
+    /// Where pictures find their irradiance besides.
+    pub diffuse: Diffuse,
 }
 
 /// The spacing that lengths are relative to where the grid's differ along its axes.
@@ -67,6 +74,9 @@ impl Default for QuerySettings {
             blank_below: 0.0,
             sum_floor: 0.0,
             look_up: LookUp::Normal,
+            least_weight: 0.0,
+            glossy: Glossy::None,
+            diffuse: Diffuse::Stored,
         }
     }
 }
@@ -205,6 +215,10 @@ impl QuerySettings {
         unit("query.distance_bias", self.distance_bias);
         unit("query.blank_below", self.blank_below);
         unit("query.sum_floor", self.sum_floor);
+        unit("query.least_weight", self.least_weight);
+        self.glossy.check(rule);
+        self.diffuse.check(rule);
+        let mut unit = |key: &'static str, x: f32| rule(key, x.to_string(), (0.0..=1.0).contains(&x), UNIT);
         match self.direction {
             DirectionWeight::Uniform => {}
             DirectionWeight::Cosine { floor } => unit("query.direction.cosine.floor", floor),

@@ -9,3 +9,4 @@ mod ddgi;
 mod eccentric;
 mod fixture;
 mod furnace;
+mod march;

@@ -15,7 +15,7 @@ const LANES: usize = 8;
 type Lanes = [f32; LANES];
 
 /// See the module.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Dense {
     /// Directions and solid angles of the texels, [`LANES`] at a time; beyond the last texel nothing weighs anything.
     x: Vec<Lanes>,

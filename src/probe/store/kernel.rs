@@ -79,7 +79,7 @@ impl Directions {
 const SPARSE_BYTES: f64 = (256u64 << 20) as f64;
 
 /// A sparse matrix from capture texels to the texels of a stored map; each row sums to 1.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Kernel {
     /// `row_start[o]..row_start[o + 1]` are the entries of output texel `o`.
     row_start: Vec<usize>,

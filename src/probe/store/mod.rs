@@ -11,6 +11,7 @@ pub mod layout;
 pub mod map;
 pub mod moments;
 pub mod occlusion;
+pub mod prefilter;
 pub mod radiance;
 pub mod regions;
 pub mod sh;
@@ -26,6 +27,7 @@ use serde::{Deserialize, Serialize};
 pub use self::irradiance::{Irradiance, IrradianceStore};
 use self::layout::LayoutSettings;
 pub use self::occlusion::{Occlusion, OcclusionStore};
+use self::prefilter::Prefilter;
 use self::radiance::{LightFieldStore, RadianceStore};
 
 /// What probes hold, and in which form.
@@ -39,6 +41,8 @@ pub struct StoreSettings {
     pub light_field: LightFieldStore,
     /// Texels per side of the levels of radiance for glossy surfaces, from the capture's own on, each half of the one before.
     pub prefiltered: Vec<usize>,
+    /// How they are blurred.
+    pub prefilter: Prefilter,
     pub layout: LayoutSettings,
 }
 
@@ -48,6 +52,7 @@ impl StoreSettings {
         RadianceStore {
             light_field: self.light_field,
             prefiltered: &self.prefiltered,
+            prefilter: self.prefilter,
             format: self.irradiance.format(),
             border: self.border,
         }
@@ -62,6 +67,7 @@ impl Default for StoreSettings {
             occlusion: OcclusionStore::default(),
             light_field: LightFieldStore::None,
             prefiltered: Vec::new(),
+            prefilter: Prefilter::Halved,
             layout: LayoutSettings::default(),
         }
     }

@@ -3,7 +3,13 @@
 //! A light field holds of every texel the outgoing radiance, W·m⁻²·sr⁻¹, the normal, octahedral, and the distance of what
 //! the probe sees there, metres; where it sees no surface, the normal is that of the direction back to the probe and the
 //! distance [`FAR_M`]. Level 0 of the levels is the same radiance, and each of the others the mean of 2×2 texels of the one
-//! above, as texture units do it. A probe takes `R′²·(4 + 4 + 2) + Σ K²·4` bytes in the packed format.
+//! above, as texture units do it, or blurred as rough surfaces do it ([`Prefilter`]). A probe takes
+//! `R′²·(4 + 4 + 2) + Σ K²·4` bytes in the packed format.
+//!
+//! A light field that rays march through ([`crate::probe::query::march`]) has normals of two bytes and a level of lowest
+//! distances, each the least of the texels below it: `R′²·(4 + 2 + 2) + M²·2` bytes.
+
+use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3, Vec3A};
 use half::f16;
@@ -11,7 +17,9 @@ use safetensors::Dtype;
 use serde::{Deserialize, Serialize};
 
 use super::encode::{ColorFormat, decode_colors, encode_colors};
-use super::map::{OctahedralMaps, fill_with_border};
+use super::kernel::Kernel;
+use super::map::{OctahedralMaps, fill_with_border, interior_texel};
+use super::prefilter::Prefilter;
 use crate::math::octahedral::{oct_from_direction, texel_direction};
 use crate::probe::container::{Container, EncodingLosses};
 
@@ -26,10 +34,40 @@ pub enum LightFieldStore {
     None,
     /// Radiance, normals and distances in maps of the capture's resolution.
     Maps,
+    /// The same for rays to march through: with a level of lowest distances of so many texels per side.
+    March { lowest: usize },
 }
 
 /// Bytes of a normal and of a distance: two f16 and one.
 const G_BUFFER_BYTES: usize = 4 + 2;
+/// The same of two bytes and an f16.
+const SMALL_G_BUFFER_BYTES: usize = 2 + 2;
+/// Bytes of a lowest distance, f16.
+const LOWEST_BYTES: usize = 2;
+
+impl LightFieldStore {
+    /// Bytes of a texel's normal and distance.
+    fn g_buffer_bytes(self) -> usize {
+        match self {
+            LightFieldStore::None => 0,
+            LightFieldStore::Maps => G_BUFFER_BYTES,
+            LightFieldStore::March { .. } => SMALL_G_BUFFER_BYTES,
+        }
+    }
+
+    /// Texels per side of the level of lowest distances, where there is one.
+    fn lowest(self) -> Option<usize> {
+        match self {
+            LightFieldStore::None | LightFieldStore::Maps => None,
+            LightFieldStore::March { lowest } => Some(lowest),
+        }
+    }
+
+    /// Whether rays can march through it.
+    pub fn marches(self) -> bool {
+        self.lowest().is_some()
+    }
+}
 
 /// What a probe sees.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,6 +75,8 @@ pub struct LightField {
     pub radiance: OctahedralMaps<Vec3>,
     pub normal: OctahedralMaps<Vec2>,
     pub distance: OctahedralMaps<f32>,
+    /// The least distance of each block of texels; `None` where rays do not march.
+    pub lowest: Option<OctahedralMaps<f32>>,
 }
 
 /// All radiance that a volume holds.
@@ -46,6 +86,8 @@ pub struct Radiance {
     /// From the finest to the coarsest.
     pub prefiltered: Vec<OctahedralMaps<Vec3>>,
     pub format: Option<ColorFormat>,
+    /// From captured texels to each level; none where levels come from each other.
+    pub filters: Vec<Kernel>,
 }
 
 /// Which radiance a method stores.
@@ -53,6 +95,7 @@ pub struct Radiance {
 pub struct RadianceStore<'a> {
     pub light_field: LightFieldStore,
     pub prefiltered: &'a [usize],
+    pub prefilter: Prefilter,
     pub format: ColorFormat,
     pub border: usize,
 }
@@ -66,14 +109,16 @@ impl RadianceStore<'_> {
     /// Black maps of captures with so many texels per side.
     pub fn zeros(&self, probes: usize, side: usize) -> Radiance {
         let border = self.border;
-        let light_field = (self.light_field == LightFieldStore::Maps).then(|| LightField {
+        let light_field = (self.light_field != LightFieldStore::None).then(|| LightField {
             radiance: OctahedralMaps::new(probes, side, border, Vec3::ZERO),
             normal: OctahedralMaps::new(probes, side, border, Vec2::ZERO),
             distance: OctahedralMaps::new(probes, side, border, FAR_M),
+            lowest: self.light_field.lowest().map(|n| OctahedralMaps::new(probes, n, 0, FAR_M)),
         });
         let level = |&n: &usize| OctahedralMaps::new(probes, n, border, Vec3::ZERO);
         let format = (!self.is_empty()).then_some(self.format);
-        Radiance { light_field, prefiltered: self.prefiltered.iter().map(level).collect(), format }
+        let filters = self.prefilter.kernels(self.prefiltered);
+        Radiance { light_field, prefiltered: self.prefiltered.iter().map(level).collect(), format, filters }
     }
 
     /// Bytes of a probe's light field and of its levels in the layout that shading uses; `g_buffer`: with normals and
@@ -83,7 +128,10 @@ impl RadianceStore<'_> {
         let texel = self.format.bytes_per_texel();
         let field = match self.light_field {
             LightFieldStore::None => 0,
-            LightFieldStore::Maps => texels(side) * (texel + if g_buffer { G_BUFFER_BYTES } else { 0 }),
+            store => {
+                let lowest = store.lowest().map_or(0, |n| n * n * LOWEST_BYTES);
+                texels(side) * (texel + if g_buffer { store.g_buffer_bytes() } else { 0 }) + lowest
+            }
         };
         (field, self.prefiltered.iter().map(|&n| texels(n) * texel).sum())
     }
@@ -94,7 +142,7 @@ impl RadianceStore<'_> {
         const FIELD: usize = 12 + 8 + 4 + 12 + 12;
         const LEVEL: usize = 12 + 12 + 12;
         let texels = |n: usize| (n + 2 * self.border).pow(2);
-        let field = if self.light_field == LightFieldStore::Maps { texels(side) * FIELD } else { 0 };
+        let field = if self.light_field != LightFieldStore::None { texels(side) * FIELD } else { 0 };
         (field + self.prefiltered.iter().map(|&n| texels(n) * LEVEL).sum::<usize>()) as u64
     }
 
@@ -110,6 +158,14 @@ impl RadianceStore<'_> {
                     .to_owned(),
             );
         };
+        if let Some(lowest) = self.light_field.lowest()
+            && (self.border != 0 || lowest == 0 || !side.is_multiple_of(lowest))
+        {
+            return Some(format!(
+                "store.light_field is march(lowest: {lowest}) of maps of {side} texels: lowest must divide that, and \
+                 store.border must be 0"
+            ));
+        }
         let mut finer = None;
         for &level in self.prefiltered {
             let wanted = finer.map_or(side, |n: usize| n / 2);
@@ -135,18 +191,20 @@ impl Radiance {
         let prefiltered: Vec<usize> = self.prefiltered.iter().map(|maps| maps.resolution).collect();
         let first = self.light_field.as_ref().map(|field| &field.radiance).or(self.prefiltered.first());
         let (Some(first), Some(format)) = (first, self.format) else { return (0, 0) };
-        let light_field = match self.light_field {
-            Some(_) => LightFieldStore::Maps,
+        let light_field = match self.light_field.as_ref().map(|field| field.lowest.as_ref()) {
+            Some(Some(lowest)) => LightFieldStore::March { lowest: lowest.resolution },
+            Some(None) => LightFieldStore::Maps,
             None => LightFieldStore::None,
         };
-        let store = RadianceStore { light_field, prefiltered: &prefiltered, format, border: first.border };
+        let (prefilter, border) = (Prefilter::Halved, first.border);
+        let store = RadianceStore { light_field, prefiltered: &prefiltered, prefilter, format, border };
         store.runtime_bytes(first.resolution, g_buffer)
     }
 
     /// Sets what a probe sees: radiance by texel and, for light fields, the surfaces there.
     pub fn set(&mut self, probe: usize, radiance: &[Vec3A], surface: impl Fn(usize) -> Option<(Vec3, f32)>) {
         let texels: Vec<Vec3> = radiance.iter().map(|&l| l.into()).collect();
-        if let Some(LightField { radiance, normal, distance }) = &mut self.light_field {
+        if let Some(LightField { radiance, normal, distance, lowest }) = &mut self.light_field {
             let (n, border) = (radiance.resolution, radiance.border);
             let (normals, distances): (Vec<Vec2>, Vec<f32>) = (0..n * n)
                 .map(|o| match surface(o) {
@@ -157,26 +215,69 @@ impl Radiance {
             fill_with_border(&texels, n, border, radiance.probe_mut(probe));
             fill_with_border(&normals, n, border, normal.probe_mut(probe));
             fill_with_border(&distances, n, border, distance.probe_mut(probe));
+            if let Some(lowest) = lowest {
+                let least = lowest_of(&distances, n, lowest.resolution);
+                lowest.probe_mut(probe).copy_from_slice(&least);
+            }
         }
         let mut level = texels;
         for (i, maps) in self.prefiltered.iter_mut().enumerate() {
-            if i > 0 {
+            if let Some(filter) = self.filters.get(i) {
+                let mut blurred = vec![Vec3A::ZERO; filter.rows()];
+                filter.irradiance(radiance, &mut blurred);
+                level = blurred.into_iter().map(|e| (e / PI).into()).collect();
+            } else if i > 0 {
                 level = halved(&level, maps.resolution);
             }
             fill_with_border(&level, maps.resolution, maps.border, maps.probe_mut(probe));
         }
     }
 
+    /// Levels of the light field's own radiance where none are stored, as texture units make them of it: each half as large as
+    /// the one before, down to [`SMALLEST_LEVEL`] texels. Maps whose sides are odd share texels among the next level's.
+    pub fn make_levels(&mut self) {
+        let Some(field) = self.light_field.as_ref().filter(|_| self.prefiltered.is_empty()) else { return };
+        let (first, border) = (&field.radiance, field.radiance.border);
+        let probes = first.texels.len() / first.texels_per_probe().max(1);
+        let mut levels = vec![first.clone()];
+        while let Some(finer) = levels.last().filter(|finer| finer.resolution >= 2 * SMALLEST_LEVEL) {
+            let (n, side) = (finer.resolution, finer.resolution / 2);
+            let mut next = OctahedralMaps::new(probes, side, border, Vec3::ZERO);
+            let interior = interior_texel(n, border);
+            for probe in 0..probes {
+                let texels: Vec<Vec3> = (0..n * n).map(|o| finer.probe(probe)[interior(o)]).collect();
+                fill_with_border(&shrunk(&texels, n, side), side, border, next.probe_mut(probe));
+            }
+            levels.push(next);
+        }
+        self.prefiltered = levels;
+    }
+
+    /// Bytes of a probe that glossy surfaces need: its levels, else its light field with all that rays march through.
+    pub fn glossy_bytes(&self) -> usize {
+        let (field, levels) = self.runtime_bytes(true);
+        if self.prefiltered.is_empty() { field } else { levels }
+    }
+
     /// Writes its tensors.
     pub fn write(&self, container: &mut Container, losses: &mut EncodingLosses) {
         let format = self.format.unwrap_or(ColorFormat::R11G11B10F);
-        if let Some(LightField { radiance, normal, distance }) = &self.light_field {
+        if let Some(LightField { radiance, normal, distance, lowest }) = &self.light_field {
             write_colors(RADIANCE, radiance, format, container, losses);
             let side = radiance.side();
             let probes = radiance.texels.len() / (side * side);
             let half = |x: f32| f16::from_f32(x).to_le_bytes();
-            let numbers = normal.texels.iter().flat_map(|n| [half(n.x), half(n.y)]);
-            container.put(NORMAL, Dtype::F16, &[probes, side, side, 2], numbers);
+            let shape = [probes, side, side, 2];
+            if let Some(lowest) = lowest {
+                let bytes = normal.texels.iter().flat_map(|n| [byte_of(n.x), byte_of(n.y)]).collect();
+                container.put_bytes(NORMAL, Dtype::U8, &shape, bytes);
+                let side = lowest.side();
+                let numbers = lowest.texels.iter().map(|&d| half(d));
+                container.put(LOWEST, Dtype::F16, &[probes, side, side], numbers);
+            } else {
+                let numbers = normal.texels.iter().flat_map(|n| [half(n.x), half(n.y)]);
+                container.put(NORMAL, Dtype::F16, &shape, numbers);
+            }
             let numbers = distance.texels.iter().map(|&d| half(d));
             container.put(DISTANCE, Dtype::F16, &[probes, side, side], numbers);
         }
@@ -203,13 +304,32 @@ impl Radiance {
                 }
             };
             let shape = [Some(probes), Some(side), Some(side), Some(2)];
-            let normals = halves(NORMAL, &shape)?;
+            let lowest = match container.has(LOWEST) {
+                true => {
+                    let numbers = halves(LOWEST, &[Some(probes), None, None])?;
+                    let tensor = container.tensor(LOWEST, &[Dtype::F16], &[Some(probes), None, None])?;
+                    let resolution = tensor.map_resolution(LOWEST, 0)?;
+                    if border != 0 || resolution == 0 || !radiance.resolution.is_multiple_of(resolution) {
+                        let side = radiance.resolution;
+                        return Err(format!("tensor '{LOWEST}' has {resolution} texels a side, maps have {side}"));
+                    }
+                    Some(OctahedralMaps { resolution, border: 0, texels: numbers })
+                }
+                false => None,
+            };
+            let normals = match lowest {
+                Some(_) => {
+                    let bytes = &container.tensor(NORMAL, &[Dtype::U8], &shape)?.bytes;
+                    bytes.iter().map(|&byte| oct_of(byte)).collect()
+                }
+                None => halves(NORMAL, &shape)?,
+            };
             let distances = halves(DISTANCE, &shape[..3])?;
             let resolution = radiance.resolution;
             let texels = normals.as_chunks::<2>().0.iter().map(|n| Vec2::from(*n)).collect();
             let normal = OctahedralMaps { resolution, border, texels };
             let distance = OctahedralMaps { resolution, border, texels: distances };
-            out.light_field = Some(LightField { radiance, normal, distance });
+            out.light_field = Some(LightField { radiance, normal, distance, lowest });
             out.format = Some(format);
         }
         for k in 0.. {
@@ -236,10 +356,52 @@ fn halved(texels: &[Vec3], n: usize) -> Vec<Vec3> {
         .collect()
 }
 
+/// The least distance of every block of texels; `n` blocks per side are left.
+pub fn lowest_of(distances: &[f32], side: usize, n: usize) -> Vec<f32> {
+    let block = side / n;
+    let mut out = vec![f32::INFINITY; n * n];
+    for (o, &distance) in distances.iter().enumerate() {
+        let least = &mut out[o % side / block + n * (o / side / block)];
+        *least = least.min(distance);
+    }
+    out
+}
+
+/// The mean over the area of each of `side`² texels of a map of `n`², n at most 2·`side` + 1.
+fn shrunk(texels: &[Vec3], n: usize, side: usize) -> Vec<Vec3> {
+    let width = n as f32 / side as f32;
+    // Texels that a new one meets along an axis, with their shares.
+    let met = |i: usize| {
+        let (low, high) = (i as f32 * width, (i + 1) as f32 * width);
+        (low as usize..(high.ceil() as usize).min(n)).map(move |t| {
+            let share = (high.min((t + 1) as f32) - low.max(t as f32)) / width;
+            (t, share.max(0.0))
+        })
+    };
+    let mean = |o: usize| {
+        let rows = met(o / side).flat_map(|(y, v)| met(o % side).map(move |(x, u)| (x + n * y, u * v)));
+        rows.map(|(t, share)| texels[t] * share).sum()
+    };
+    (0..side * side).map(mean).collect()
+}
+
+/// A coordinate of `oct` in a byte; inverse of [`oct_of`].
+fn byte_of(x: f32) -> u8 {
+    (x.clamp(-1.0, 1.0) * 127.5 + 127.5).round() as u8
+}
+
+fn oct_of(byte: u8) -> f32 {
+    f32::from(byte) / 127.5 - 1.0
+}
+
+/// Texels per side below which light fields have no further levels: 128 and 126 both have five.
+const SMALLEST_LEVEL: usize = 7;
+
 /// Names in the file.
 const RADIANCE: &str = "radiance";
 const NORMAL: &str = "normal";
 const DISTANCE: &str = "radial_distance";
+const LOWEST: &str = "lowest_distance";
 
 fn level_name(k: usize) -> String {
     format!("prefiltered.{k}")
@@ -296,7 +458,13 @@ mod tests {
     use super::*;
 
     fn store(prefiltered: &[usize]) -> RadianceStore<'_> {
-        RadianceStore { light_field: LightFieldStore::Maps, prefiltered, format: ColorFormat::R11G11B10F, border: 1 }
+        RadianceStore {
+            light_field: LightFieldStore::Maps,
+            prefiltered,
+            prefilter: Prefilter::Halved,
+            format: ColorFormat::R11G11B10F,
+            border: 1,
+        }
     }
 
     #[test]
@@ -323,6 +491,48 @@ mod tests {
         assert_eq!(bytes, 2 * (field + levels));
         container.tensors.remove(NORMAL);
         assert!(Radiance::read(&container, 2, 1).unwrap_err().contains("normal"));
+    }
+
+    #[test]
+    fn light_fields_to_march_through_come_back() {
+        let light_field = LightFieldStore::March { lowest: 2 };
+        let store = RadianceStore { light_field, border: 0, ..store(&[]) };
+        let mut radiance = store.zeros(1, 4);
+        radiance.set(0, &[Vec3A::ONE; 16], |o| (o != 5).then_some((Vec3::Y, 1.0 + o as f32)));
+        let field = radiance.light_field.as_ref().unwrap();
+        // Blocks of 2×2; the texel without a surface lies in the first.
+        assert_eq!(field.lowest.as_ref().unwrap().texels, [1.0, 3.0, 9.0, 11.0]);
+        let mut container = Container::default();
+        radiance.write(&mut container, &mut EncodingLosses::default());
+        let read = Radiance::read(&container, 1, 0).unwrap();
+        let again = read.light_field.as_ref().unwrap();
+        assert_eq!((&field.distance, &field.lowest), (&again.distance, &again.lowest));
+        // Half a step of 1/127.5.
+        let near = |(a, b): (&Vec2, &Vec2)| (*a - *b).abs().max_element() <= 0.5 / 127.5 + 1e-6;
+        assert!(field.normal.texels.iter().zip(&again.normal.texels).all(near));
+        let bytes: usize = container.tensors.values().map(|t| t.bytes.len()).sum();
+        assert_eq!(bytes, store.runtime_bytes(4, true).0);
+        assert_eq!(read.runtime_bytes(true), store.runtime_bytes(4, true));
+        for (side, border) in [(5, 0), (4, 1)] {
+            assert!(RadianceStore { border, ..store }.mismatch(Some(side)).is_some());
+        }
+    }
+
+    /// Odd sides: the mean over the area keeps constants and the sum.
+    #[test]
+    fn levels_are_made_of_light_fields() {
+        let mut radiance = store(&[]).zeros(1, 63);
+        let light: Vec<Vec3A> = (0..63 * 63).map(|o| Vec3A::splat((o % 63) as f32)).collect();
+        radiance.set(0, &light, |_| None);
+        radiance.make_levels();
+        let sides: Vec<usize> = radiance.prefiltered.iter().map(|maps| maps.resolution).collect();
+        assert_eq!(sides, [63, 31, 15, 7]);
+        for maps in &radiance.prefiltered {
+            let interior = interior_texel(maps.resolution, maps.border);
+            let n = maps.resolution * maps.resolution;
+            let mean = (0..n).map(|o| maps.probe(0)[interior(o)].x).sum::<f32>() / n as f32;
+            assert!((mean - 31.0).abs() < 1e-3, "{} texels: {mean}", maps.resolution);
+        }
     }
 
     #[test]

@@ -273,8 +273,13 @@ mod tests {
     /// Two probes 4 m apart along x; probe p sees the radiance p + 1 at the distance `reach[p]` everywhere.
     fn two(reach: [f32; 2]) -> Volume {
         let grid = Grid::from_parts(DVec3::ZERO, Vec3::splat(4.0), UVec3::new(2, 1, 1)).unwrap();
-        let store =
-            RadianceStore { light_field: LightFieldStore::Maps, prefiltered: &[], format: ColorFormat::F32, border: 1 };
+        let store = RadianceStore {
+            light_field: LightFieldStore::Maps,
+            prefiltered: &[],
+            prefilter: Default::default(),
+            format: ColorFormat::F32,
+            border: 1,
+        };
         let mut radiance = store.zeros(2, 4);
         for (p, reach) in reach.into_iter().enumerate() {
             radiance.set(p, &[Vec3A::splat(p as f32 + 1.0); 16], |_| Some((Vec3::X, reach)));

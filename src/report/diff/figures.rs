@@ -103,6 +103,11 @@ impl Facts {
     pub fn configurations(&self) -> BTreeSet<&str> {
         self.0.keys().filter_map(|place| place.strip_prefix("configurations.")?.strip_suffix(".label")).collect()
     }
+
+    /// Names of the engines whose look-ups a render has beside a method's own.
+    pub fn engines(&self) -> BTreeSet<&str> {
+        self.0.keys().filter_map(|place| place.strip_prefix("methods.as_")?.strip_suffix(".name")).collect()
+    }
 }
 
 /// What the random numbers of both sides have to do with each other.
@@ -207,6 +212,8 @@ mod tests {
         assert_eq!((facts.number("methods.a.leak.light"), facts.number("energy")), (Some(0.5), Some(2.0)));
         assert_eq!(facts.number("configurations.x.y=1.converged"), Some(0.5));
         assert_eq!(facts.configurations(), BTreeSet::from(["x.y=1"]));
+        let render = Facts::of_report(&json!({"methods": [{"name": "visibility_on"}, {"name": "as_bevy"}]}));
+        assert_eq!(render.engines(), BTreeSet::from(["bevy"]));
         let names: Vec<String> = side_by_side("", [&facts, &facts]).into_iter().map(|figure| figure.name).collect();
         assert_eq!(
             names,

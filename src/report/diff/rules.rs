@@ -84,8 +84,13 @@ pub struct Finding {
 /// All findings about an item of this kind. `pair`: of the comparison of the two.
 pub fn findings(kind: &str, item: &str, sides: [&Facts; 2], pair: &Facts, seeds: Seeds) -> Vec<Finding> {
     let of_kind = RULES.iter().filter(|rule| rule.kinds.split(' ').any(|name| name == kind));
-    let [base, candidate] = sides.map(Facts::configurations);
-    let labels = |rule: &Rule| if rule.of == "*" { &base & &candidate } else { BTreeSet::from([""]) };
+    let both = |of: fn(&Facts) -> BTreeSet<&str>| &of(sides[0]) & &of(sides[1]);
+    let (configurations, engines) = (both(Facts::configurations), both(Facts::engines));
+    let labels = |rule: &Rule| match rule.of.as_str() {
+        "*" => configurations.clone(),
+        "as_*" => engines.clone(),
+        _ => BTreeSet::from([""]),
+    };
     let all = of_kind.flat_map(|rule| labels(rule).into_iter().map(move |label| (rule, label)));
     all.filter_map(|(rule, label)| rule.find(item, label, sides, pair, seeds)).collect()
 }
@@ -139,7 +144,7 @@ impl Rule {
         if is_new {
             explanation += " The base's report does not have it: it is not judged.";
         }
-        let item = join(item, if self.of == "*" { label } else { &self.of });
+        let item = join(item, &self.of.replace('*', label));
         let (name, unit) = (self.gate.clone(), self.unit.as_str());
         let side_unit = unit_of(&place);
         let gate = Gate {

@@ -18,13 +18,18 @@
     return element;
   };
 
-  // Round values from the least to the most: 1, 2 and 5 times powers of ten, fewer where there are many.
-  const ticks = (low, high) => {
+  // Round values from the least to the most: 1, 2 and 5 times powers of ten, fewer where there are many, more where there are few.
+  const rounds = (low, high, steps) => {
     const all = [];
     for (let power = Math.floor(Math.log10(low)); power <= Math.ceil(Math.log10(high)); power++) {
-      for (const step of [1, 2, 5]) all.push(step * 10 ** power);
+      for (const step of steps) all.push(step * 10 ** power);
     }
-    const inside = all.filter((value) => value >= low && value <= high);
+    return all.filter((value) => value >= low && value <= high);
+  };
+
+  const ticks = (low, high) => {
+    let inside = rounds(low, high, [1, 2, 5]);
+    if (inside.length < 3) inside = rounds(low, high, [1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8]);
     const tens = inside.filter((value) => Math.abs(Math.log10(value) - Math.round(Math.log10(value))) < 1e-9);
     return inside.length > 9 && tens.length > 1 ? tens : inside;
   };

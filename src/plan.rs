@@ -19,10 +19,58 @@ pub struct Line {
     pub stage: &'static str,
     pub kept: bool,
     pub reason: String,
-    /// Of the probe file or, for images, of memory; `null` where not known.
+    /// Of the probe file or, for images and captures, of memory; `null` where not known.
     pub saved_bytes: Option<u64>,
-    /// Estimate; `null` where not known.
+    /// What as much of it as was done took, for as much as was left out; `null` where none was done.
     pub saved_s: Option<f64>,
+}
+
+/// What was seen of a grid and its probes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Looked {
+    /// Cells that were looked at, and all of them; `None`: all.
+    pub cells: Option<(usize, usize)>,
+    pub unsampled: usize,
+    pub inside: usize,
+    /// Whether some surface does not see some probe around it.
+    pub blocked: bool,
+    /// Of what the method knows about occlusion, of all probes.
+    pub occlusion_bytes: f64,
+}
+
+impl Looked {
+    /// All that placement and the survey of the surfaces found.
+    pub fn at(config: &Config, grid: &Grid, placement: &Placement) -> Looked {
+        let survey = placement.survey.as_ref();
+        Looked {
+            cells: None,
+            unsampled: placement.count(ProbeState::NeverSampled),
+            inside: placement.count(ProbeState::InsideGeometry),
+            blocked: survey.is_none_or(|survey| !survey.all_visible(grid, &placement.states)),
+            occlusion_bytes: occlusion_bytes(config, placement),
+        }
+    }
+
+    /// What a reason says after what all cells were not looked at for.
+    fn as_far_as(&self) -> String {
+        self.cells.map_or_else(String::new, |(cells, all)| format!(", as far as {cells} of {all} cells tell"))
+    }
+}
+
+/// Bytes of what the method knows about occlusion, of all probes.
+pub fn occlusion_bytes(config: &Config, placement: &Placement) -> f64 {
+    let (store, probes) = (&config.store, placement.states.len());
+    let per_probe = store.occlusion.runtime_bytes(store.border, placement.regions.as_ref(), probes, &store.layout);
+    per_probe * probes as f64
+}
+
+/// What an active probe took in the mean, and how many others there are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PerProbe {
+    pub left_out: usize,
+    /// Of capture, bounces and fit.
+    pub seconds: f64,
+    pub capture_bytes: f64,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -34,6 +82,12 @@ pub struct Plan {
     pub radiance_levels: bool,
 }
 
+/// The stage of probes that are not baked.
+const UNUSED_PROBES: &str = "unused_probes";
+
+/// The stage of images.
+const TEXTURES: &str = "textures";
+
 /// The stage whose line is added last.
 const BOUNCES: &str = "bounces";
 
@@ -43,8 +97,8 @@ pub fn stage_in_words(stage: &str, kept: bool) -> &str {
 }
 
 impl Plan {
-    /// Decides from the scene, the configuration and what placement and the survey of the surfaces found.
-    pub fn new(world: &World, config: &Config, grid: &Grid, placement: &Placement) -> Plan {
+    /// Decides from the scene, the configuration and what was seen of the grid.
+    pub fn of(world: &World, config: &Config, grid: &Grid, looked: &Looked) -> Plan {
         let scene = world.scene;
         let mut lines = vec![
             punctual(scene),
@@ -53,20 +107,35 @@ impl Plan {
             alpha(scene),
             textures(scene),
             glossy(scene, config, grid.probe_count()),
-            unsampled(config, placement),
+            unsampled(config, looked),
         ];
         // The survey knows nothing of surfaces beyond the probes' hull.
-        let surveyed = grid.covers(&scene.mesh);
-        let blocked = placement.survey.as_ref().is_none_or(|s| !surveyed || !s.all_visible(grid, &placement.states));
+        let blocked = looked.blocked || !grid.covers(&scene.mesh);
         let wanted = config.plan.keep.iter().any(|stage| stage == VISIBILITY);
         let visibility = (blocked || wanted) && !config.store.occlusion.is_none();
-        lines.push(visibility_line(config, placement, visibility, blocked));
+        lines.push(visibility_line(config, looked, visibility, blocked));
         for line in lines.iter_mut().filter(|l| !l.kept && config.plan.keeps(l.stage)) {
             line.reason = format!("kept by configuration; {}", line.reason);
             (line.kept, line.saved_bytes, line.saved_s) = (true, None, None);
         }
         let radiance_levels = lines.iter().any(|l| l.stage == RADIANCE_LEVELS && l.kept);
         Plan { lines, visibility, radiance_levels }
+    }
+
+    /// Says what was saved: of probes that were left out what as many others took, of images their bytes. Files say none of it:
+    /// that memory and time are those of a run.
+    pub fn measure(&mut self, scene: &Scene, probes: &PerProbe) {
+        for line in &mut self.lines {
+            let left_out = probes.left_out as f64;
+            match line.stage {
+                UNUSED_PROBES if !line.kept => {
+                    line.saved_s = Some(probes.seconds * left_out);
+                    line.saved_bytes = Some((probes.capture_bytes * left_out).round() as u64);
+                }
+                TEXTURES if scene.collapsed_bytes > 0 => line.saved_bytes = Some(scene.collapsed_bytes),
+                _ => {}
+            }
+        }
     }
 
     /// Adds the line about bounces, known only afterwards: `done` iterations in `bounces_s` seconds.
@@ -139,8 +208,8 @@ fn textures(scene: &Scene) -> Line {
         n => format!(", {n} constant one(s) reduced to one texel"),
     };
     match fetched {
-        0 => line("textures", false, format!("no texture that varies{collapsed}")),
-        n => line("textures", true, format!("{n} texture(s){collapsed}")),
+        0 => line(TEXTURES, false, format!("no texture that varies{collapsed}")),
+        n => line(TEXTURES, true, format!("{n} texture(s){collapsed}")),
     }
 }
 
@@ -174,25 +243,22 @@ fn glossy(scene: &Scene, config: &Config, probes: usize) -> Line {
     }
 }
 
-fn unsampled(config: &Config, placement: &Placement) -> Line {
-    let unsampled = placement.count(ProbeState::NeverSampled);
-    let inside = placement.count(ProbeState::InsideGeometry);
-    let reason = format!("{unsampled} probe(s) that no surface can sample, {inside} inside geometry");
-    line("unused_probes", unsampled + inside == 0 || config.placement.keep_unsampled && inside == 0, reason)
+fn unsampled(config: &Config, looked: &Looked) -> Line {
+    let Looked { unsampled, inside, .. } = *looked;
+    let about = looked.as_far_as();
+    let reason = format!("{unsampled} probe(s) that no surface can sample, {inside} inside geometry{about}");
+    line(UNUSED_PROBES, unsampled + inside == 0 || config.placement.keep_unsampled && inside == 0, reason)
 }
 
-fn visibility_line(config: &Config, placement: &Placement, kept: bool, blocked: bool) -> Line {
-    let occlusion = &config.store.occlusion;
+fn visibility_line(config: &Config, looked: &Looked, kept: bool, blocked: bool) -> Line {
+    const ALL_SEE: &str = "every surface sees all probes around it";
     match () {
-        _ if occlusion.is_none() => line(VISIBILITY, false, "the method has none"),
+        _ if config.store.occlusion.is_none() => line(VISIBILITY, false, "the method has none"),
         _ if blocked => line(VISIBILITY, true, "some surfaces do not see all probes around them"),
-        _ if kept => line(VISIBILITY, true, "kept by configuration; every surface sees all probes around it"),
+        _ if kept => line(VISIBILITY, true, format!("kept by configuration; {ALL_SEE}")),
         _ => {
-            let probes = placement.states.len();
-            let per_probe =
-                occlusion.runtime_bytes(config.store.border, placement.regions.as_ref(), probes, &config.store.layout);
-            let saved_bytes = Some((per_probe * probes as f64).round() as u64);
-            Line { saved_bytes, ..line(VISIBILITY, false, "every surface sees all probes around it") }
+            let saved_bytes = Some(looked.occlusion_bytes.round() as u64);
+            Line { saved_bytes, ..line(VISIBILITY, false, format!("{ALL_SEE}{}", looked.as_far_as())) }
         }
     }
 }

@@ -23,11 +23,11 @@ pub enum BakeError {
 #[derive(Debug, Clone)]
 pub struct Circumstances {
     pub seed: u64,
-    /// Most bytes of captures kept in memory, with the rows that are worked out of them; the rest is traced again for every
-    /// bounce, with the same result.
+    /// Memory that the process is to take at most; what the machine has where not given. Captures that do not fit are read
+    /// from the checkpoint, or, where there is none, traced again whenever they are asked for, with the same result.
     pub memory_budget_bytes: Option<u64>,
     pub progress: Progress,
-    /// Where iterations are saved while a long bake runs, and whether to go on from there.
+    /// Where the work is saved while a long bake runs, and whether to go on from there.
     pub checkpoint: Option<Checkpoint>,
 }
 
@@ -35,13 +35,8 @@ pub struct Circumstances {
 pub struct Checkpoint {
     pub path: PathBuf,
     pub resume: bool,
-    /// Least time between two checkpoints.
+    /// Bakes that take less write none, unless memory does not hold all captures. Least time between two savings of iterations.
     pub interval: Duration,
-}
-
-impl Checkpoint {
-    /// Short bakes write none.
-    pub const INTERVAL: Duration = Duration::from_secs(10);
 }
 
 impl Circumstances {

@@ -1,7 +1,7 @@
 //! How much memory a bake takes: the arrays that grow with probes, resolutions and surfaces, by formulas beside which the
 //! rest is small.
 
-use super::circumstances::BakeError;
+use super::circumstances::{BakeError, Circumstances};
 use crate::config::Config;
 use crate::probe::Grid;
 use crate::probe::capture::surfel::{PackedNormal, Surfel};
@@ -10,18 +10,15 @@ use crate::probe::fit;
 use crate::probe::place::survey;
 use crate::probe::store::radiance::LightFieldStore;
 use crate::probe::transport::anderson::History;
-use crate::probe::transport::rows;
 use crate::scene::{Mesh, Scene};
-use crate::system::memory::{TooLittleMemory, available_bytes};
+use crate::system::memory::{TooLittleMemory, available_bytes, resident_bytes};
 
 /// What every probe takes besides its maps: position and state, twice, what placement found around it, and the heads of
 /// its capture, of its masks and of an iteration's result.
 const PROBE_BYTES: u64 = size_of::<Option<ProbeCapture>>() as u64 + 160;
 
 /// A captured surface with the mask that the bounces keep of it.
-pub const SURFEL_BYTES: u64 = size_of::<Surfel>() as u64 + 1;
-/// A texel that emits, in a list that grows by doubling.
-pub const EMITTED_BYTES: u64 = 2 * size_of::<(u32, glam::Vec3)>() as u64;
+const SURFEL_BYTES: u64 = size_of::<Surfel>() as u64 + 1;
 
 /// Bytes of a bake's large arrays, by what they grow with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,10 +68,10 @@ impl Memory {
         bounces.saturating_add(self.in_flight).saturating_add(self.fit)
     }
 
-    /// Refuses what does not fit; `captures` are the bytes of those that are kept.
-    pub fn check(&self, config: &Config, captures: u64) -> Result<(), TooLittleMemory> {
+    /// Refuses what does not fit, whatever is kept of captures.
+    pub fn check(&self, config: &Config) -> Result<(), TooLittleMemory> {
         let Some(available) = available_bytes() else { return Ok(()) };
-        let needed = self.standing().saturating_add(captures).max(self.survey.saturating_add(self.probes));
+        let needed = self.standing().max(self.survey.saturating_add(self.probes));
         if needed <= available {
             return Ok(());
         }
@@ -92,7 +89,6 @@ impl Memory {
             (self.kernels, kernels, "filtering captures of that size into maps of that size"),
             (self.maps, maps, "the probes' maps"),
             (self.in_flight, capture, "one capture for each thread"),
-            (captures, capture, "keeping all captures"),
             (self.fit, "fit.rows.rows_per_probe", "the rows of the fit"),
         ];
         let largest = parts.into_iter().max_by_key(|part| part.0).unwrap_or(parts[0]);
@@ -102,7 +98,6 @@ impl Memory {
             needed,
             available,
             remedy: match largest.2 {
-                "keeping all captures" => "give a --memory-budget, or lower it or the number of probes",
                 _ if largest.1 == "grid.spacing_m" => "raise it",
                 _ => "lower it",
             },
@@ -117,26 +112,7 @@ impl Memory {
 /// [`BakeError::Grid`], [`BakeError::Memory`].
 pub fn check(config: &Config, scene: &Scene) -> Result<(), BakeError> {
     let grid = Grid::refined(&config.grid, config.placement.refine, scene)?;
-    Ok(Memory::of(config, &grid, &scene.mesh).check(config, 0)?)
-}
-
-/// Whether all captures fit into memory even where every probe is baked and every ray meets a surface; else only
-/// [`Prepared::check_memory`] can tell whether they do.
-///
-/// # Errors
-/// [`BakeError::Grid`].
-pub fn surely_fits(config: &Config, scene: &Scene) -> Result<bool, BakeError> {
-    let grid = Grid::refined(&config.grid, config.placement.refine, scene)?;
-    let kept = if config.transport.captures_once() { kept_bytes(config) } else { 0 };
-    let captures = (grid.probe_count() as u64).saturating_mul(kept);
-    Ok(Memory::of(config, &grid, &scene.mesh).check(config, captures).is_ok())
-}
-
-/// Most that is kept of one probe's captured surfaces, with what is worked out of them.
-pub fn kept_bytes(config: &Config) -> u64 {
-    let has_rows = rows::are_kept(&config.transport, &config.store.irradiance);
-    let rows = if has_rows { config.capture.rays.kept() as u64 * size_of::<Surfel>() as u64 } else { 0 };
-    surfels_bytes(config) + rows
+    Ok(Memory::of(config, &grid, &scene.mesh).check(config)?)
 }
 
 /// Most that one probe's captured surfaces can take.
@@ -144,4 +120,18 @@ pub fn surfels_bytes(config: &Config) -> u64 {
     let geometric = if config.query.needs_geometric() { size_of::<PackedNormal>() as u64 } else { 0 };
     let seen = if config.store.light_field == LightFieldStore::None { 0 } else { size_of::<Seen>() as u64 };
     config.capture.rays.kept() as u64 * (SURFEL_BYTES + geometric) + config.capture.rays.texels() as u64 * seen
+}
+
+/// Bytes of captures that are kept in memory: what the budget, or without one the machine, leaves beside all else.
+pub fn capture_budget(memory: &Memory, circumstances: &Circumstances) -> u64 {
+    /// Of the machine's memory: the rest is for what changes there meanwhile.
+    const MACHINE_SHARE: f64 = 0.9;
+    let standing = memory.standing();
+    match circumstances.memory_budget_bytes {
+        Some(budget) => budget.saturating_sub(standing.saturating_add(resident_bytes())),
+        None => match available_bytes() {
+            Some(available) => ((available as f64 * MACHINE_SHARE) as u64).saturating_sub(standing),
+            None => u64::MAX,
+        },
+    }
 }

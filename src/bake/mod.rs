@@ -8,6 +8,7 @@ mod circumstances;
 mod common;
 pub mod convert;
 pub mod figures;
+mod foretell;
 mod gather;
 mod log;
 mod memory;
@@ -15,13 +16,14 @@ mod memory;
 mod mixed_tests;
 mod pilot;
 mod pipeline;
-mod predict;
 mod prepared;
 mod replay;
+pub mod saving;
 #[cfg(test)]
 mod tests;
 
 pub use self::circumstances::{BakeError, Checkpoint, Circumstances};
-pub use self::memory::{check, surely_fits};
+pub use self::foretell::{Foretold, foretell};
+pub use self::memory::check;
 pub use self::pipeline::Baked;
 pub use self::prepared::{Prepared, prepare};

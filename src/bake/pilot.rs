@@ -6,6 +6,7 @@ use super::circumstances::Circumstances;
 use super::gather::gather;
 use super::log::Log;
 use super::prepared::Prepared;
+use super::saving::Saving;
 use crate::light::sampled::RayCount;
 use crate::math::random::Purpose;
 use crate::probe::capture::guide::{Guide, Pilot};
@@ -23,7 +24,13 @@ const UNSURE: f32 = 8.0;
 
 impl Prepared<'_, '_> {
     /// Where guided rays go; `None` where there are none.
-    pub(super) fn pilot(&self, circumstances: &Circumstances, log: &mut Log) -> Option<Guide> {
+    pub(super) fn pilot(
+        &self,
+        circumstances: &Circumstances,
+        budget: u64,
+        saving: &mut Saving,
+        log: &mut Log,
+    ) -> Option<Guide> {
         let (side, per_texel, guided) = self.capture.rays.guided()?;
         let bounces = self.config.transport.rough_bounces();
         if bounces == 0 {
@@ -34,7 +41,7 @@ impl Prepared<'_, '_> {
         let capture = Capture { settings: &settings, purpose: Purpose::Pilot, ..self.capture(circumstances) };
         // What breaks here breaks again in the captures that count.
         let mut own = Log::new(Progress::hidden());
-        let (captures, occlusion) = gather(self, &capture, circumstances, &mut own);
+        let (captures, occlusion) = gather(self, &capture, budget, saving, &mut own);
         let mut volume = self.volume(if self.plan.visibility { occlusion } else { Occlusion::None });
         let kernel = self.kernel(&volume);
         let operator = Operator {

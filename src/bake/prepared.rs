@@ -9,7 +9,7 @@ use super::memory::Memory;
 use crate::config::{Config, VISIBILITY};
 use crate::light::World;
 use crate::math::random::Purpose;
-use crate::plan::Plan;
+use crate::plan::{Looked, Plan, occlusion_bytes};
 use crate::probe::capture::{Capture, CaptureSettings, ProbeCapture, Resampling};
 use crate::probe::lattice::ProbeState;
 use crate::probe::place::{Placement, PlacementSettings, PlacementTask, place};
@@ -47,10 +47,23 @@ pub fn prepare<'w, 's>(
     config: &'w Config,
     circumstances: &Circumstances,
 ) -> Result<Prepared<'w, 's>, BakeError> {
-    let mut log = Log::new(circumstances.progress);
     let grid = Grid::refined(&config.grid, config.placement.refine, world.scene)?;
+    prepare_on(world, config, circumstances, grid)
+}
+
+/// The same on a grid that may be another than the configuration's.
+///
+/// # Errors
+/// It needs more memory than there is.
+pub(super) fn prepare_on<'w, 's>(
+    world: &'w World<'s>,
+    config: &'w Config,
+    circumstances: &Circumstances,
+    grid: Grid,
+) -> Result<Prepared<'w, 's>, BakeError> {
+    let mut log = Log::new(circumstances.progress);
     let memory = Memory::of(config, &grid, &world.scene.mesh);
-    memory.check(config, 0)?;
+    memory.check(config)?;
     let keep_unsampled = config.placement.keep_unsampled || config.plan.keeps("unused_probes");
     let settings = PlacementSettings { keep_unsampled, ..config.placement.clone() };
     let task = PlacementTask {
@@ -61,7 +74,7 @@ pub fn prepare<'w, 's>(
     };
     let placement =
         log.stage(|times| &mut times.survey, "placing", 1, |bar| place(world, &task, || bar.set_prefix("surveying")));
-    let plan = Plan::new(world, config, &grid, &placement);
+    let plan = Plan::of(world, config, &grid, &Looked::at(config, &grid, &placement));
     let hull = grid.hull(HULL_TOLERANCE);
     let rays = config.capture.rays.without(config.placement.rule.reserved_rays());
     let capture = CaptureSettings { rays, ..config.capture.clone() };
@@ -100,6 +113,25 @@ impl Prepared<'_, '_> {
         let occlusion = if self.stores_occlusion() { &store.occlusion } else { &OcclusionStore::None };
         let directions = self.capture.rays.directions();
         occlusion.builder(self.placement.regions.as_ref(), &directions, &self.grid, store.border)
+    }
+
+    /// Whether some surface does not see some probe around it, as far as the survey knows.
+    pub(super) fn is_blocked(&self) -> bool {
+        let placement = &self.placement;
+        placement.survey.as_ref().is_none_or(|survey| !survey.all_visible(&self.grid, &placement.states))
+    }
+
+    /// Bytes of what the method knows about occlusion, of all probes.
+    pub(super) fn occlusion_bytes(&self) -> f64 {
+        occlusion_bytes(self.config, &self.placement)
+    }
+
+    /// At most `most` active probes, spread evenly, and how many each of them stands for.
+    pub(super) fn some_probes(&self, most: usize) -> (Vec<usize>, f64) {
+        let active = self.active();
+        let pilot: Vec<usize> = active.iter().copied().step_by(active.len().div_ceil(most).max(1)).collect();
+        let share = active.len() as f64 / pilot.len().max(1) as f64;
+        (pilot, share)
     }
 
     pub(super) fn active(&self) -> Vec<usize> {

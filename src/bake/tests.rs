@@ -37,13 +37,26 @@ fn a_resumed_bake_gives_the_same_bytes() {
     let checkpoint = |resume| Checkpoint { path: path.clone(), resume, interval: Duration::ZERO };
     let whole = bake(None);
     assert!(!path.exists());
-    // With an interval of zero every iteration is saved; the last stands.
+    // With an interval of zero all captures and every iteration are saved; the last stands.
     bake(Some(checkpoint(false)));
     let saved = std::fs::read(&path).unwrap();
     let resumed = bake(Some(checkpoint(true)));
-    assert_eq!(std::fs::read(&path).unwrap(), saved, "nothing was left to iterate");
+    assert_eq!(std::fs::read(&path).unwrap(), saved, "nothing was left to capture or to iterate");
     assert_eq!(resumed.container, whole.container);
     assert_eq!(resumed.solution, whole.solution);
+    // Whatever a kill cuts off is made again.
+    for part in [1, 3, 5, 7] {
+        std::fs::write(&path, &saved[..100 + (saved.len() - 100) * part / 8]).unwrap();
+        let resumed = bake(Some(checkpoint(true)));
+        assert_eq!(resumed.container, whole.container, "{part} eighths of the file");
+        // Captures in another order, if at all.
+        assert!(std::fs::read(&path).unwrap().len() >= saved.len());
+    }
+    // And so is what is damaged.
+    let mut damaged = saved;
+    (100..damaged.len()).step_by(4097).for_each(|at| damaged[at] ^= 16);
+    std::fs::write(&path, damaged).unwrap();
+    assert_eq!(bake(Some(checkpoint(true))).container, whole.container);
 }
 
 /// A small bake up to the iterations.
@@ -95,14 +108,14 @@ fn iterations_go_on_from_a_checkpoint_as_if_nothing_had_happened() {
     let mut whole = traced.volume();
     let solution =
         solver::solve(&operator, &config.transport.iteration(), &mut whole, Iterations::default(), |state, volume| {
-            checkpoint::write(&path(state.solution.bounces.len()), "this bake", state, volume).unwrap();
+            std::fs::write(path(state.solution.bounces.len()), checkpoint::pack(state, volume)).unwrap();
         });
     let done = solution.bounces.len();
     assert!(solution.converged && solution.bounces.iter().filter(|b| b.accelerated).count() > 3, "{solution:?}");
     // In the plain iterations, among the accelerated ones, at the end.
     for iterations in [1, 2, done / 2, done - 1, done] {
         let mut volume = traced.volume();
-        let state = checkpoint::read(&path(iterations), "this bake", &mut volume).unwrap();
+        let state = checkpoint::unpack(&std::fs::read(path(iterations)).unwrap(), &mut volume).unwrap();
         assert_eq!(solver::solve(&operator, &config.transport.iteration(), &mut volume, state, |_, _| {}), solution);
         assert_eq!(volume.irradiance, whole.irradiance, "from iteration {iterations}");
     }

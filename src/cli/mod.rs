@@ -10,6 +10,7 @@ mod values;
 
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 
@@ -21,7 +22,7 @@ pub use self::inspect::{HelpArgs, InspectArgs};
 pub use self::look::LookArgs;
 pub use self::trace::TraceArgs;
 pub use self::values::{LookAt, PictureSize, TraceRay};
-use self::values::{parse_exposure, parse_index, parse_positive, parse_size, parse_target_error};
+use self::values::{parse_exposure, parse_index, parse_positive, parse_seconds, parse_size, parse_target_error};
 
 /// Bakes light-field probe volumes for global illumination and measures how much they leak, err and cost.
 #[derive(Debug, Parser)]
@@ -174,13 +175,22 @@ pub struct BakeArgs {
     /// Also trace the capture's rays with bare Embree and report their rate.
     #[arg(long)]
     pub measure_raw: bool,
-    /// Most memory for captured surfaces; what does not fit is traced again at every bounce, with the same result.
+    /// Memory that the program is to take at most, such as 2GiB; as much as the machine has where not given.
+    ///
+    /// Captured surfaces that do not fit are kept in OUT.probes.resume, and what else is needed is taken in any case: the
+    /// result is the same. --dry-run says how much that is.
     #[arg(long, value_name = "SIZE", value_parser = parse_size, allow_negative_numbers = true)]
     pub memory_budget: Option<u64>,
-    /// Continue an interrupted bake of the same scene, configuration and seed from OUT.probes.resume, which is saved every
-    /// 10 s while bounces run.
+    /// Continue an interrupted bake of the same scene, configuration and seed from OUT.probes.resume: the result is that of
+    /// one run.
+    ///
+    /// Captured probes and iterations are not computed again; placement, and a fit, are.
     #[arg(long)]
     pub resume: bool,
+    /// Save the work to OUT.probes.resume once the bake takes longer than this, and iterations as often: seconds, 0 for at
+    /// once. The file is removed when the bake is done.
+    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = parse_seconds, allow_negative_numbers = true)]
+    pub checkpoint_every: Duration,
 }
 
 #[derive(Debug, Args)]

@@ -1,6 +1,7 @@
 //! Values that flags take, and what is said about those they do not take.
 
 use std::str::FromStr;
+use std::time::Duration;
 
 /// Width and height, pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -119,8 +120,36 @@ pub fn parse_not_negative(text: &str) -> Result<f32, String> {
     number.ok_or_else(|| "write a finite number from 0 up".into())
 }
 
+/// Bytes of a size with its unit: 512 alone may be meant as bytes or as mebibytes.
 pub fn parse_size(text: &str) -> Result<u64, String> {
-    text.parse::<bytesize::ByteSize>()
-        .map(|size| size.as_u64())
-        .map_err(|_| "write a size such as 512MiB or 2GB".into())
+    let size = text.parse::<bytesize::ByteSize>().map_err(|_| "write a size such as 512MiB or 2GB")?;
+    if !text.trim_end().ends_with(|last: char| last.is_ascii_alphabetic()) {
+        return Err(format!("a size needs a unit: write {0}MiB, {0}GB, or {0}B for bytes", text.trim()));
+    }
+    Ok(size.as_u64())
+}
+
+/// Seconds of up to a year.
+pub fn parse_seconds(text: &str) -> Result<Duration, String> {
+    let seconds: Option<f64> = text.parse().ok().filter(|x| (0.0..=3.2e7).contains(x));
+    seconds.map(Duration::from_secs_f64).ok_or_else(|| "write seconds from 0 to 3.2e7".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_need_a_unit() {
+        for (text, bytes) in [("512MiB", 512 << 20), ("2GB", 2_000_000_000), ("0B", 0), ("7 kib", 7 << 10)] {
+            assert_eq!(parse_size(text), Ok(bytes), "{text}");
+        }
+        for text in ["512", "0", "1.5", "512 "] {
+            let message = parse_size(text).unwrap_err();
+            assert!(message.contains("unit") && message.contains("MiB"), "{text}: {message}");
+        }
+        for text in ["", "MiB", "-1MiB", "lots"] {
+            assert!(parse_size(text).unwrap_err().contains("512MiB"), "{text}");
+        }
+    }
 }

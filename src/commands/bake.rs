@@ -3,24 +3,21 @@
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 
 use super::session::{Opening, Session, list_presets, lists_presets, resolve_config};
 use super::{Console, grid_advice, target, tell, write_json};
-use crate::bake::{Baked, Checkpoint, Circumstances, Prepared, prepare};
+use crate::bake::{Baked, Checkpoint, Circumstances, Foretold, foretell, prepare, saving};
 use crate::cli::BakeArgs;
 use crate::config::Config;
 use crate::plan::{Line, stage_in_words};
 use crate::probe::fit::FitFigures;
-use crate::probe::lattice::ProbeState;
-use crate::probe::transport::checkpoint;
 use crate::report::bake::{BakeReport, BytesPerProbe, SCHEMA, SolverReport};
 use crate::report::table::{Column, Table};
 use crate::scene::Detail;
-use crate::system::format;
-use crate::system::interrupt;
 use crate::system::memory::peak_memory_bytes;
 use crate::system::output::Named;
+use crate::system::{format, interrupt, journal};
 
 pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     if lists_presets(&args.config.preset) {
@@ -43,27 +40,41 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
         return finish(args, &report, &config, &session);
     }
     let circumstances = circumstances(args, &config, &session)?;
+    if args.dry_run {
+        return dry_run(&foretell(&world, &config, &circumstances)?, &config, console);
+    }
     let prepared = prepare(&world, &config, &circumstances)?;
     tell::prepared(console, &prepared);
-    if args.dry_run {
-        return dry_run(&prepared, &circumstances, console);
-    }
     let raw_started = Instant::now();
     let raw = args.measure_raw.then(|| prepared.raw_rays_per_s(&circumstances)).flatten();
     let raw_s = raw_started.elapsed().as_secs_f64();
     let mut baked = prepared.bake(&circumstances, &session.scene_record())?;
     tell::baked(console, &baked);
+    if let Some(why) = &baked.unsaved {
+        console.warn(format!("the work was not saved on the way: {why}"));
+    }
 
     let Some(output) = &args.output else { return Ok(()) };
     let write_started = Instant::now();
-    let file_bytes = baked.container.write(output)?;
-    checkpoint::remove(&checkpoint::path_for(output));
+    let file_bytes = write(&baked, output)?;
     baked.times.write = write_started.elapsed().as_secs_f64();
     (baked.times.load, baked.times.accel_build) = (session.load_s, accel_build_s);
     // The measurement is no part of the bake.
     baked.times.total = session.elapsed_s() - raw_s;
 
     finish(args, &report(&baked, &config, &session, file_bytes, raw), &config, &session)
+}
+
+/// Writes the file, and removes what was saved on the way. Where it cannot be written, that is kept.
+fn write(baked: &Baked, output: &Path) -> Result<u64> {
+    let saved = saving::path_for(output);
+    let written = baked.container.write(output);
+    if written.is_err() && journal::is_journal(&saved) {
+        let saved = saved.display();
+        return Err(anyhow!("{}; {saved} keeps the work, --resume goes on from it", written.unwrap_err()));
+    }
+    journal::remove(&saved);
+    Ok(written?)
 }
 
 /// Says what was done.
@@ -92,18 +103,18 @@ fn opening<'a>(args: &'a BakeArgs, config: &Config) -> Result<Opening<'a>> {
     })
 }
 
-/// Memory, progress and checkpoints of the bake. A checkpoint that cannot be resumed from is refused before captures are
-/// traced again.
+/// Memory, progress and checkpoints of the bake. What cannot be resumed from is refused before anything is traced.
 fn circumstances(args: &BakeArgs, config: &Config, session: &Session) -> Result<Circumstances> {
-    let checkpoint = args.output.as_ref().map(|output| Checkpoint {
-        path: checkpoint::path_for(output),
+    let checkpoint = args.output.as_ref().filter(|_| !args.dry_run).map(|output| Checkpoint {
+        path: saving::path_for(output),
         resume: args.resume,
-        interval: Checkpoint::INTERVAL,
+        interval: args.checkpoint_every,
     });
     if let Some(Checkpoint { path, resume: true, .. }) = &checkpoint {
         if path.exists() {
-            checkpoint::check(path, &checkpoint::identity(&session.scene.blake3, session.seed, &config.to_ron()))?;
-            session.console.note(format!("going on from {}", path.display()));
+            let identity = saving::identity(&session.scene.blake3, session.seed, &config.to_ron());
+            let saved = saving::check(path, &identity)?;
+            session.console.note(format!("going on from {}: {}", path.display(), saved.in_words()));
         } else {
             session.console.warn(format!("--resume: there is no {}; starting anew", path.display()));
         }
@@ -126,49 +137,53 @@ fn outputs(args: &BakeArgs) -> Result<Vec<Named>> {
     }
     let output = args.output.as_ref().context("no output: give -o OUT.probes")?;
     let report = args.report.as_ref().map(|report| Named::new("--report", report));
-    let checkpoint = Named::new("the file that --resume reads", checkpoint::path_for(output));
+    let checkpoint = Named::new("the file that --resume reads", saving::path_for(output));
     Ok([Named::new("-o", output), checkpoint].into_iter().chain(report).collect())
 }
 
-fn dry_run(prepared: &Prepared, circumstances: &Circumstances, console: &Console) -> Result<()> {
-    let p = prepared.predict(circumstances);
-    let active = prepared.placement.count(ProbeState::Active);
+fn dry_run(p: &Foretold, config: &Config, console: &Console) -> Result<()> {
     if console.json {
         let report = serde_json::json!({
             "schema": "lightprobe-plan/1",
-            "probes": prepared.grid.probe_count(),
-            "probes_active": active,
+            "probes": p.grid.probe_count(),
+            "probes_active": p.probes_active,
+            "cells": p.grid.cell_count(),
+            "cells_looked_at": p.cells,
             "predicted_time_s": p.time_s(),
             "predicted_survey_s": p.survey_s,
             "predicted_capture_s": p.capture_s,
             "predicted_bounce_s": p.bounce_s,
             "predicted_bounces": p.bounces,
+            "predicted_fit_s": p.fit_s,
             "predicted_memory_bytes": p.memory_bytes(),
             "predicted_capture_bytes": p.capture_bytes,
             "predicted_map_bytes": p.map_bytes,
             "predicted_scene_bytes": p.resident_bytes,
             "predicted_survey_bytes": p.survey_bytes,
-            "plan": prepared.plan.lines,
+            "plan": p.plan.lines,
         });
         return console.print(&serde_json::to_string_pretty(&report)?);
     }
-    console.print(&plan_table(&prepared.plan.lines))?;
+    console.print(&plan_table(&p.plan.lines))?;
     let capture = format::seconds(p.capture_s);
-    let iterations = match prepared.config.transport.captures_once() {
+    let iterations = match config.transport.captures_once() {
         true => {
             let bounces = format::counted(u64::from(p.bounces), "bounce", "bounces");
             format!("capture {capture}, {bounces} of {} each", format::seconds(p.bounce_s))
         }
         false => format!("capture {capture} in {}", format::counted(u64::from(p.bounces), "frame", "frames")),
     };
+    let fit = if config.fit.is_none() { String::new() } else { format!(", fit {}", format::seconds(p.fit_s)) };
     console.print(&format!(
-        "{} probes, {active} of them to bake\n\
-         about {}: survey {}, {}\n\
-         about {} of memory: captures {}, maps and filters {}, scene and tables {}; before them, up to the survey, {}",
-        prepared.grid.probe_count(),
+        "{} probes, about {} of them to bake\n\
+         about {}: survey {}, {}{}\n\
+         about {} of memory: captures {}, maps, filters and rows {}, scene {}; up to the survey {}",
+        p.grid.probe_count(),
+        p.probes_active,
         format::seconds(p.time_s()),
         format::seconds(p.survey_s),
         iterations,
+        fit,
         format::bytes(p.memory_bytes()),
         format::bytes(p.capture_bytes),
         format::bytes(p.map_bytes),

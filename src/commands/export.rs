@@ -185,7 +185,7 @@ fn make(args: &ExportArgs, to: Target, probes: &ProbeFile, volume: &Volume, besi
 fn fitted(grids: &mut Grids, (session, world, settings): Beside) -> (Option<Value>, Value) {
     let steps = settings.points(grids.positions.len()).iter().sum();
     let bar = session.console.progress.stage("fitting", steps);
-    let figures = fit::run_on(grids, settings, world, session.seed, |done| bar.inc(done));
+    let figures = fit::run_on(grids, settings, world, session.seed, &mut (), |done| bar.inc(done));
     bar.finish_and_clear();
     tell::not_finite(session.console, figures.non_finite);
     (Some(figures.record()), figures.report())

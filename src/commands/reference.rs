@@ -21,10 +21,9 @@ use crate::shade::film::NoiseLevel;
 use crate::shade::points::has_blend;
 use crate::shade::reference::{Reference, ReferenceSettings, State, Tracing};
 use crate::shade::reference_file::{Identity, resume};
-use crate::system::format;
-use crate::system::interrupt;
 use crate::system::memory::peak_memory_bytes;
 use crate::system::output::Named;
+use crate::system::{format, interrupt};
 
 /// How much work a kill may lose.
 const SAVE_INTERVAL: Duration = Duration::from_secs(60);

@@ -4,15 +4,14 @@ use anyhow::{Context, Result, bail, ensure};
 
 use super::session::Session;
 use super::{Console, tell};
-use crate::bake::Circumstances;
+use crate::bake::{Circumstances, saving};
 use crate::cli::BakeArgs;
 use crate::config::Config;
 use crate::light::World;
-use crate::probe::transport::checkpoint;
 use crate::report::table::{Column, Table};
 use crate::report::target::{SeenReport, StepReport, StoppedBecause, TargetReport};
 use crate::sweep::target::search::{Found, Search};
-use crate::system::format;
+use crate::system::{format, journal};
 
 /// Refuses what does not go together with a search.
 pub fn check(args: &BakeArgs, config: &Config) -> Result<()> {
@@ -65,7 +64,7 @@ pub fn run(
     tell::baked(console, &found.baked);
     let before_write_s = session.elapsed_s();
     let file_bytes = found.baked.container.write(output)?;
-    checkpoint::remove(&checkpoint::path_for(output));
+    journal::remove(&saving::path_for(output));
     let times = &mut found.baked.times;
     times.write = session.elapsed_s() - before_write_s;
     (times.load, times.accel_build) = (session.load_s, accel_build_s);

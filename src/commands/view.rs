@@ -48,19 +48,18 @@ pub fn run(args: &LookArgs, console: &Console) -> Result<()> {
     let leaks = leaks(&texels);
     let cameras = cameras(&world);
     let exposure_ev = args.exposure.unwrap_or_else(|| exposure(&world, &query, &cameras[0], session.seed));
-    let mut notes = Vec::new();
-    if shown.left_out > 0 {
-        notes.push(format!(
+    let left_out = (shown.left_out > 0).then(|| {
+        format!(
             "The page shows the largest {} triangles: {} smaller ones, {} of the area, are left out.",
             format::count(MOST_TRIANGLES as u64),
             format::count(shown.left_out as u64),
             format::percent(shown.left_out_area)
-        ));
-    }
-    if session.scene_changed {
-        notes.push("The scene is not the one of the bake: its files or its sky have changed since.".to_owned());
-    }
-    notes.iter().take(1).filter(|_| shown.left_out > 0).for_each(|note| console.warn(note));
+        )
+    });
+    left_out.iter().for_each(|note| console.warn(note));
+    const CHANGED: &str = "The scene is not the one of the bake: its files or its sky have changed since.";
+    let changed = session.scene_changed.then(|| CHANGED.to_owned());
+    let notes = left_out.into_iter().chain(changed).collect();
     let html = look::render(Look {
         scene,
         query: &query,

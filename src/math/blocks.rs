@@ -93,8 +93,10 @@ impl BlockSample {
             return [below as u32, (below >> 32) as u32];
         }
         let index = scrambled(self.index, scramble as u32);
-        let x = scrambled(van_der_corput(index), (scramble >> TREE_BITS) as u32);
-        let y = scrambled(sobol(index), (scramble >> (2 * TREE_BITS)) as u32);
+        // Four bits scrambled are four bits: the mask only tells the compiler so.
+        let [x, y] = SEQUENCE[(index & (BLOCK - 1)) as usize].map(u32::from);
+        let x = scrambled(x, (scramble >> TREE_BITS) as u32);
+        let y = scrambled(y, (scramble >> (2 * TREE_BITS)) as u32);
         // The two halves of `below` fill the bits below the four that stratify.
         [(x << (32 - BITS)) | (below as u32 >> BITS), (y << (32 - BITS)) | ((below >> 32) as u32 >> BITS)]
     }
@@ -124,30 +126,55 @@ impl Numbers for BlockSample {
     }
 }
 
-/// Owen's scrambling of four bits. Bit k from the top is flipped by the random bit that belongs to the values of the
-/// bits above it.
+/// Sixteen bits of a word in each quarter of another.
+const IN_QUARTERS: u64 = 0x0001_0001_0001_0001;
+
+/// For each value of four bits the random bits that belong to them, one in each quarter, the one of the lowest bit first: of
+/// bit k from the top that which belongs to the values of the bits above it.
+const NODES: [u64; BLOCK as usize] = {
+    let mut nodes = [0; BLOCK as usize];
+    let mut value = 0;
+    while value < nodes.len() {
+        let mut k = 0;
+        while k < BITS {
+            let node = (1 << k) - 1 + (value >> (BITS - k));
+            nodes[value] |= 1 << (node as u32 + 16 * (BITS - 1 - k));
+            k += 1;
+        }
+        value += 1;
+    }
+    nodes
+};
+
+/// Owen's scrambling of four bits. Each is flipped by its random bit of [`NODES`].
 #[inline]
 fn scrambled(value: u32, random: u32) -> u32 {
-    let flip = |k: u32| {
-        let node = (1 << k) - 1 + (value >> (BITS - k));
-        ((random >> node) & 1) << (BITS - 1 - k)
-    };
-    value ^ (flip(0) | flip(1) | flip(2) | flip(3))
+    /// Brings the lowest bit of quarter k to bit 48 + k; all other products lie elsewhere.
+    const GATHER: u64 = 1 << 48 | 1 << 33 | 1 << 18 | 1 << 3;
+    let chosen = u64::from(random & ((1 << TREE_BITS) - 1)) * IN_QUARTERS & NODES[(value & (BLOCK - 1)) as usize];
+    // The top bit of a quarter is then whether any of it is set.
+    let set = (chosen + IN_QUARTERS * 0x7FFF) >> 15 & IN_QUARTERS;
+    value ^ (set.wrapping_mul(GATHER) >> 48) as u32 & (BLOCK - 1)
 }
 
-/// First dimension of the (0,2)-sequence: the index with its bits reversed.
-#[inline]
-fn van_der_corput(index: u32) -> u32 {
-    index.reverse_bits() >> (32 - BITS)
-}
-
-/// Second dimension (Sobol' 1967): the columns of Pascal's triangle modulo 2.
-#[inline]
-fn sobol(index: u32) -> u32 {
-    const COLUMNS: [u32; BITS as usize] = [0b1000, 0b1100, 0b1010, 0b1111];
-    let column = |k: u32| COLUMNS[k as usize] * ((index >> k) & 1);
-    column(0) ^ column(1) ^ column(2) ^ column(3)
-}
+/// The (0,2)-sequence, both coordinates in units of 1/16. The first dimension is the index with its bits reversed, the second
+/// (Sobol' 1967) adds the columns of Pascal's triangle modulo 2.
+const SEQUENCE: [[u8; 2]; BLOCK as usize] = {
+    const COLUMNS: [u8; BITS as usize] = [0b1000, 0b1100, 0b1010, 0b1111];
+    let mut points = [[0; 2]; BLOCK as usize];
+    let mut index = 0;
+    while index < points.len() {
+        let mut k = 0;
+        while k < COLUMNS.len() {
+            let bit = (index >> k & 1) as u8;
+            points[index][0] |= bit << (COLUMNS.len() - 1 - k);
+            points[index][1] ^= bit * COLUMNS[k];
+            k += 1;
+        }
+        index += 1;
+    }
+    points
+};
 
 #[cfg(test)]
 mod tests {
@@ -165,6 +192,33 @@ mod tests {
             sample.pair()
         };
         (0..n).map(point).collect()
+    }
+
+    /// The definition, bit by bit.
+    #[test]
+    fn every_bit_is_flipped_by_the_random_bit_of_those_above_it() {
+        let mut random = Random::new(1, Purpose::Path, 0, 0);
+        for _ in 0..1000 {
+            let tree = random.bits();
+            for value in 0..BLOCK {
+                let flip = |k: u32| {
+                    let node = (1 << k) - 1 + (value >> (BITS - k));
+                    (tree >> node & 1) << (BITS - 1 - k)
+                };
+                assert_eq!(scrambled(value, tree), value ^ (0..BITS).map(flip).sum::<u32>(), "{value} {tree:x}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_sequence_is_that_of_van_der_corput_and_sobol() {
+        for index in 0..BLOCK {
+            let reversed = index.reverse_bits() >> (32 - BITS);
+            // Pascal's triangle modulo 2.
+            let sobol = [0b1000, 0b1100, 0b1010, 0b1111].into_iter().enumerate();
+            let sobol = sobol.fold(0, |sum, (k, column)| sum ^ (column * (index >> k & 1)));
+            assert_eq!(SEQUENCE[index as usize].map(u32::from), [reversed, sobol]);
+        }
     }
 
     #[test]

@@ -44,7 +44,9 @@ impl Scene {
         if material.unlit {
             return Vec3::ZERO;
         }
-        let (_, metallic) = self.roughness_metallic(triangle, barycentric);
+        // What no texture can make metal need not be looked up.
+        let is_metal = material.metallic != 0.0;
+        let metallic = if is_metal { self.roughness_metallic(triangle, barycentric).1 } else { 0.0 };
         self.base_color(triangle, barycentric).truncate().clamp(Vec3::ZERO, Vec3::ONE) * (1.0 - metallic)
     }
 

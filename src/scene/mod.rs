@@ -41,6 +41,8 @@ pub struct Scene {
     pub mesh: Mesh,
     pub materials: Vec<Material>,
     pub textures: Vec<Texture>,
+    /// Memory that images do not take because all of their texels are equal, bytes.
+    pub collapsed_bytes: u64,
     pub lights: Vec<PunctualLight>,
     pub cameras: Vec<Camera>,
     pub environment: Environment,

@@ -11,25 +11,17 @@ use crate::math::color::linear_from_srgb;
 static LINEAR_FROM_SRGB8: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| linear_from_srgb(code as f32 / 255.0)));
 
+/// Linear value of 8-bit alpha and data.
+#[inline]
+fn unit(code: u8) -> f32 {
+    f32::from(code) * (1.0 / 255.0)
+}
+
 impl Texture {
     /// Linear RGBA of one texel. The indices must be in range.
     #[inline]
     pub(super) fn texel(&self, x: u32, y: u32) -> Vec4 {
-        let i = y as usize * self.width as usize + x as usize;
-        match &self.texels {
-            Texels::Rgba32F(data) => data[i],
-            Texels::Rgba8 { data, srgb } => {
-                let [r, g, b, a] = data[i];
-                let unit = |code: u8| f32::from(code) * (1.0 / 255.0);
-                if *srgb {
-                    let table: &[f32; 256] = &LINEAR_FROM_SRGB8;
-                    let linear = |code: u8| table[code as usize];
-                    Vec4::new(linear(r), linear(g), linear(b), unit(a))
-                } else {
-                    Vec4::new(unit(r), unit(g), unit(b), unit(a))
-                }
-            }
-        }
+        self.mix([self.index(x, y)], |[texel]| texel)
     }
 
     /// Linear RGBA at `uv`, interpolated bilinearly, or the nearest texel if the sampler asks for that. There are no
@@ -48,9 +40,27 @@ impl Texture {
         let f = p - Vec2::new(column as f32, row as f32);
         let x = [self.wrapped(0, column), self.wrapped(0, column.saturating_add(1))];
         let y = [self.wrapped(1, row), self.wrapped(1, row.saturating_add(1))];
-        let top = self.texel(x[0], y[0]).lerp(self.texel(x[1], y[0]), f.x);
-        let bottom = self.texel(x[0], y[1]).lerp(self.texel(x[1], y[1]), f.x);
-        top.lerp(bottom, f.y)
+        let corners = [(x[0], y[0]), (x[1], y[0]), (x[0], y[1]), (x[1], y[1])].map(|(x, y)| self.index(x, y));
+        self.mix(corners, |[a, b, c, d]| a.lerp(b, f.x).lerp(c.lerp(d, f.x), f.y))
+    }
+
+    #[inline]
+    fn index(&self, x: u32, y: u32) -> usize {
+        y as usize * self.width as usize + x as usize
+    }
+
+    /// What `mix` makes of the linear RGBA of some texels. How these are stored is asked once for all.
+    #[inline]
+    fn mix<const N: usize>(&self, at: [usize; N], mix: impl Fn([Vec4; N]) -> Vec4) -> Vec4 {
+        match &self.texels {
+            Texels::Rgba32F(data) => mix(at.map(|i| data[i])),
+            Texels::Rgba8 { data, srgb: true } => {
+                let table: &[f32; 256] = &LINEAR_FROM_SRGB8;
+                let linear = |code: u8| table[code as usize];
+                mix(at.map(|i| data[i]).map(|[r, g, b, a]| Vec4::new(linear(r), linear(g), linear(b), unit(a))))
+            }
+            Texels::Rgba8 { data, srgb: false } => mix(at.map(|i| data[i]).map(|texel| Vec4::from(texel.map(unit)))),
+        }
     }
 
     /// Texel index along `axis` (0 columns, 1 rows) for index `i`, which may lie outside the image.
@@ -58,6 +68,10 @@ impl Texture {
     fn wrapped(&self, axis: usize, i: i64) -> u32 {
         let size = if axis == 0 { self.width } else { self.height };
         let n = i64::from(size);
+        // Images that repeat are often met anywhere: a test would be taken at random.
+        if n & (n - 1) == 0 && self.wrap[axis] == Wrap::Repeat {
+            return (i & (n - 1)) as u32;
+        }
         // Most lookups lie inside. This test saves them a division.
         if (0..n).contains(&i) {
             return i as u32;
@@ -102,6 +116,17 @@ mod tests {
         assert_eq!(at(Wrap::ClampToEdge, -7.0), 0.0);
         assert!(at(Wrap::Repeat, f32::NAN).is_finite());
         assert!(at(Wrap::MirroredRepeat, f32::INFINITY).is_finite());
+    }
+
+    #[test]
+    fn sides_of_all_lengths_repeat() {
+        for width in 1..40u32 {
+            let texels = Texels::Rgba32F((0..width).map(|i| Vec4::splat(i as f32)).collect());
+            let texture = Texture { width, height: 1, wrap: [Wrap::Repeat; 2], nearest: true, texels };
+            for i in -100..100i64 {
+                assert_eq!(i64::from(texture.wrapped(0, i)), i.rem_euclid(i64::from(width)), "{i} of {width}");
+            }
+        }
     }
 
     #[test]

@@ -44,11 +44,10 @@ pub fn resident_bytes() -> u64 {
     field("/proc/self/status", "VmRSS:").unwrap_or(0)
 }
 
-/// Largest resident memory of this process so far, bytes.
+/// Largest resident memory of this process so far, bytes. Not the figure of `getrusage`: that begins with the memory of
+/// the program that started this one.
 pub fn peak_memory_bytes() -> u64 {
-    let usage = nix::sys::resource::getrusage(nix::sys::resource::UsageWho::RUSAGE_SELF);
-    // Linux counts in KiB.
-    usage.map_or(0, |u| u.max_rss() as u64 * 1024)
+    field("/proc/self/status", "VmHWM:").unwrap_or(0)
 }
 
 fn machine() -> Option<u64> {

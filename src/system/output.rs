@@ -3,6 +3,7 @@
 mod check;
 mod error;
 mod paths;
+mod pending;
 mod replace;
 mod write;
 

@@ -89,6 +89,7 @@ fn arguments_that_do_not_parse() {
         (&["bake", text(&furnace), "-o", text(&output), "--env", "sky.png"], "sky.png"),
         (&["bake", text(&furnace), "-o", text(&output), "--seed", "x"], "--seed"),
         (&["bake", text(&furnace), "-o", text(&output), "--memory-budget", "lots"], "512MiB"),
+        (&["bake", text(&furnace), "-o", text(&output), "--memory-budget", "512"], "512MiB"),
         (&["bake", text(&furnace), "-o", text(&output), "--wrong"], "--wrong"),
         (&["render", text(&furnace), "p", "-o", text(&output), "--size", "0x5"], "640x360"),
         (&["render", text(&furnace), "p", "-o", text(&output), "--size", "99999x5"], "16384"),

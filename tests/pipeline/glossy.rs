@@ -47,10 +47,10 @@ fn constant_light_is_reflected_as_the_table_says() {
         assert_eq!(number(&glossy["bytes_per_probe"]), (4 * (32 * 32 + 16 * 16 + 8 * 8 + 4 * 4)) as f64);
         let mean = number(&glossy["radiance_mean"]);
         assert!((0.02..0.12).contains(&mean), "{name}: {mean}");
-        // Schlick's shadowing with k = α/2 against Smith's: 2 % of what is reflected at this roughness; and the noise of a
-        // pixel of 32 paths.
+        // What the walls reflect as gloss themselves, 5 % of the light, the probes do not have; and Schlick's shadowing with
+        // k = α/2 leaves 5 % less than Smith's.
         let error = &glossy["error_gltf"];
-        assert!(number(&error["bias"]).abs() < 0.05 * mean, "{name}: {error}");
+        assert!((-0.2..0.0).contains(&(number(&error["bias"]) / mean)), "{name}: {error}");
     }
     let parts = method(&report, "visibility_on")["glossy"]["parts"].as_array().unwrap().clone();
     let names: Vec<&str> = parts.iter().map(|part| part["name"].as_str().unwrap()).collect();
@@ -76,7 +76,9 @@ fn what_no_surface_reflects_is_left_out() {
 #[test]
 fn rays_are_traced_in_the_probes() {
     let folder = Folder::new();
-    let words = format!("{MARCH} --set grid.divisions=(3,2,2)");
+    // Within the room: of probes behind its walls all rays would be lost.
+    let inside = "--set grid.bounds={\"min\":[-2,0.5,-1.5],\"max\":[2,2.5,1.5]}";
+    let words = format!("{MARCH} --set grid.divisions=(3,2,2) {inside}");
     let baked = bake(&folder, &scene("glossy_room"), &format!("{words} --threads 1"));
     assert!(bake(&folder, &scene("glossy_room"), &format!("{words} --threads 2")).bytes == baked.bytes);
     assert_eq!(baked.file.tensors["lowest_distance"].shape, [12, 8, 8]);

@@ -17,6 +17,7 @@ mod first_hour;
 mod fitting;
 mod furnace;
 mod glossy;
+mod interrupted;
 mod layers;
 mod leaks;
 mod plan;

@@ -4,11 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 
-use crate::bake::{self, Circumstances};
+use crate::bake;
 use crate::cli::{EqualName, SweepArgs};
 use crate::commands::session::set_sky;
 use crate::config::{Config, presets};
-use crate::light::World;
 use crate::probe::lattice::grid::GridError;
 use crate::scene::Scene;
 use crate::sweep::ladder::{Ladder, LadderFile, check_shared, expand};
@@ -99,22 +98,6 @@ pub fn check_all(ladders: &[Ladder], scene: &Scene) -> Result<(), SweepError> {
     for rung in ladders.iter().flat_map(|ladder| &ladder.rungs) {
         let named = |cause| SweepError::Bake { label: rung.label.clone(), cause };
         rung.configs().into_iter().try_for_each(|(_, config)| bake::check(config, scene).map_err(named))?;
-    }
-    Ok(())
-}
-
-/// Refuses what may not fit and, looked at closer, does not.
-pub fn check_captures(ladders: &[Ladder], world: &World, seed: u64) -> Result<(), SweepError> {
-    let circumstances = Circumstances::quiet(seed);
-    for rung in ladders.iter().flat_map(|ladder| &ladder.rungs) {
-        let named = |cause| SweepError::Bake { label: rung.label.clone(), cause };
-        for (_, config) in rung.configs() {
-            if bake::surely_fits(config, world.scene).map_err(named)? {
-                continue;
-            }
-            let prepared = bake::prepare(world, config, &circumstances).map_err(named)?;
-            prepared.check_memory(&circumstances).map_err(|cause| named(cause.into()))?;
-        }
     }
     Ok(())
 }

@@ -13,7 +13,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 
-use self::methods::{check_all, check_captures, configurations, ladders, shades_gloss, shared, shift, wants_floors};
+use self::methods::{check_all, configurations, ladders, shades_gloss, shared, shift, wants_floors};
 use self::work::Work;
 use super::camera::cameras;
 use super::session::{Opening, Session, list_presets, lists_presets};
@@ -67,7 +67,6 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
     let (world, accel_build_s) = session.world()?;
     let camera =
         cameras(&args.view, &world, console)?.into_iter().next().context("there is no camera; use --look-at")?;
-    check_captures(&ladders, &world, session.seed)?;
 
     create_folder(&args.output)?;
     let settings = ReferenceSettings { spp: args.reference, seed: session.seed, ..Default::default() };

@@ -73,6 +73,7 @@ pub fn scene(lamps: &[Lamp], environment: Environment) -> Scene {
         },
         materials: lamps.iter().map(material).collect(),
         textures: Vec::new(),
+        collapsed_bytes: 0,
         lights: Vec::new(),
         cameras: Vec::new(),
         environment,

@@ -29,6 +29,16 @@ impl Seen {
         self.weight += other.weight * weight;
     }
 
+    /// All that it is. Inverse: [`Self::of_numbers`].
+    pub(super) fn numbers(&self) -> [f32; 5] {
+        let [x, y, z] = self.normal.to_array();
+        [x, y, z, self.distance_m, self.weight]
+    }
+
+    pub(super) fn of_numbers([x, y, z, distance_m, weight]: [f32; 5]) -> Seen {
+        Seen { normal: Vec3::new(x, y, z), distance_m, weight }
+    }
+
     /// Mean normal, unit, towards the probe, and mean distance, metres; `None` where there is no surface.
     pub fn surface(&self) -> Option<(Vec3, f32)> {
         (self.weight > 0.0).then(|| (self.normal.normalize_or(Vec3::Z), self.distance_m / self.weight))

@@ -5,6 +5,7 @@
 //! emitted radiance and the distance. Traced once; a bounce costs queries only.
 
 mod backs;
+pub mod bytes;
 mod captured;
 mod cube;
 pub mod guide;

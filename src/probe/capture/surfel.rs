@@ -41,6 +41,15 @@ impl PackedNormal {
         PackedNormal([oct.x, oct.y].map(|x| (x + 0.5f32.copysign(x)) as i16))
     }
 
+    pub(super) fn to_bytes(self) -> [u8; 4] {
+        let [[a, b], [c, d]] = self.0.map(i16::to_le_bytes);
+        [a, b, c, d]
+    }
+
+    pub(super) fn of_bytes([a, b, c, d]: [u8; 4]) -> PackedNormal {
+        PackedNormal([[a, b], [c, d]].map(i16::from_le_bytes))
+    }
+
     #[inline]
     pub fn oct(self) -> Vec2 {
         Vec2::new(f32::from(self.0[0]), f32::from(self.0[1])) * (1.0 / NORMAL_SCALE)
@@ -114,6 +123,35 @@ impl Surfel {
             self.position = other.position;
         }
         takes_place
+    }
+
+    /// Size in a file: without the padding of memory.
+    pub(super) const BYTES: usize = 39;
+
+    /// Little-endian, in the order of the fields. Inverse: [`Self::of_bytes`].
+    pub(super) fn to_bytes(&self) -> [u8; Self::BYTES] {
+        let mut bytes = [0; Self::BYTES];
+        let numbers = self.position.to_array().into_iter().chain(self.direct_radiance.to_array()).map(f32::to_bits);
+        let numbers = numbers.chain([self.texel]).map(u32::to_le_bytes);
+        bytes.as_chunks_mut::<4>().0.iter_mut().zip(numbers).for_each(|(to, number)| *to = number);
+        bytes[28..32].copy_from_slice(&self.normal.to_bytes());
+        bytes[32..38].as_chunks_mut::<2>().0.iter_mut().zip(self.albedo).for_each(|(to, a)| *to = a.to_le_bytes());
+        bytes[38] = self.facing.index();
+        bytes
+    }
+
+    /// `None` where the bytes are none of a surfel.
+    pub(super) fn of_bytes(bytes: [u8; Self::BYTES]) -> Option<Surfel> {
+        let words = bytes.as_chunks::<4>().0;
+        let vector = |at: usize| Vec3::from_array([0, 1, 2].map(|i| f32::from_le_bytes(words[at + i])));
+        Some(Surfel {
+            position: vector(0),
+            direct_radiance: vector(3),
+            texel: u32::from_le_bytes(words[6]),
+            normal: PackedNormal::of_bytes(words[7]),
+            albedo: [32, 34, 36].map(|at| u16::from_le_bytes([bytes[at], bytes[at + 1]])),
+            facing: *Facing::ALL.get(usize::from(bytes[38]))?,
+        })
     }
 
     /// The same surface in another texel, with the albedo and the direct radiance of that.

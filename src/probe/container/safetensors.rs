@@ -88,12 +88,23 @@ impl Container {
     /// Writes the file; readers see the old one or the whole new one.
     pub fn write(&self, path: &Path) -> Result<u64, FileError> {
         let header = self.header_text();
-        write_atomically(path, |file| {
-            file.write_all(&(header.len() as u64).to_le_bytes())?;
-            file.write_all(header.as_bytes())?;
-            self.in_file_order().into_iter().try_for_each(|(_, tensor)| file.write_all(&tensor.bytes))
-        })?;
+        write_atomically(path, |file| self.write_to(&header, file))?;
         Ok(self.bytes_with(&header))
+    }
+
+    /// The same bytes in memory.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let header = self.header_text();
+        let mut bytes = Vec::with_capacity(self.bytes_with(&header) as usize);
+        // Memory takes all that is written.
+        let _ = self.write_to(&header, &mut bytes);
+        bytes
+    }
+
+    fn write_to(&self, header: &str, to: &mut impl Write) -> io::Result<()> {
+        to.write_all(&(header.len() as u64).to_le_bytes())?;
+        to.write_all(header.as_bytes())?;
+        self.in_file_order().into_iter().try_for_each(|(_, tensor)| to.write_all(&tensor.bytes))
     }
 
     /// Size of the file that [`Self::write`] makes.
@@ -123,10 +134,17 @@ impl Container {
     /// Reads a file and checks every hash. Allocates about twice the file's size, whatever its header says.
     pub fn read(path: &Path) -> Result<Container, FileError> {
         let bytes = read_file(path).map_err(|cause| FileError::Unreadable { path: path.to_owned(), cause })?;
-        let damaged = |what: String| FileError::Damaged { path: path.to_owned(), what };
-        let parsed = SafeTensors::deserialize(&bytes).map_err(|e| damaged(format!("not safetensors ({e})")))?;
+        Container::of_bytes(&bytes).map_err(|what| FileError::Damaged { path: path.to_owned(), what })
+    }
+
+    /// The content of a file in memory; else what is wrong with it.
+    ///
+    /// # Errors
+    /// No safetensors, or another hash.
+    pub fn of_bytes(bytes: &[u8]) -> Result<Container, String> {
+        let parsed = SafeTensors::deserialize(bytes).map_err(|e| format!("not safetensors ({e})"))?;
         let (header_length, metadata) =
-            SafeTensors::read_metadata(&bytes).map_err(|e| damaged(format!("not safetensors ({e})")))?;
+            SafeTensors::read_metadata(bytes).map_err(|e| format!("not safetensors ({e})"))?;
         let mut container = Container::default();
         if let Some(metadata) = metadata.metadata() {
             container.metadata = metadata.clone().into_iter().collect();
@@ -135,9 +153,9 @@ impl Container {
             let tensor = Tensor { dtype: view.dtype(), shape: view.shape().to_vec(), bytes: view.data().to_vec() };
             container.tensors.insert(name.to_owned(), tensor);
         }
-        let header: Value = serde_json::from_slice(&bytes[8..8 + header_length])
-            .map_err(|e| damaged(format!("its header is no JSON ({e})")))?;
-        container.check_hashes(header).map_err(damaged)?;
+        let header: Value =
+            serde_json::from_slice(&bytes[8..8 + header_length]).map_err(|e| format!("its header is no JSON ({e})"))?;
+        container.check_hashes(header)?;
         Ok(container)
     }
 

@@ -50,7 +50,7 @@ pub struct Asked {
 const MOST_HIDDEN: f32 = 0.01;
 
 /// One point in so many is held out.
-const HELD_OUT: usize = 10;
+pub const HELD_OUT: usize = 10;
 
 /// How far normals are bent: n + 0.6·u, u on the unit sphere.
 const BEND: f32 = 0.6;

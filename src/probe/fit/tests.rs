@@ -282,7 +282,7 @@ fn a_furnace_is_fitted_to_its_closed_form() {
     for store in [octahedral(4), harmonics(None, true)] {
         let mut volume = over(&scene, 0.7, &store);
         let rows = RowSettings { rows_per_probe: 100, lambda: 1e-6, air: 0.3, paths: 32, ..RowSettings::default() };
-        let figures = run(&Fit::Rows(rows), &world, &untested(), &mut volume, 1, |_| ()).unwrap();
+        let figures = run(&Fit::Rows(rows), &world, &untested(), &mut volume, 1, &mut (), |_| ()).unwrap();
         assert_eq!(figures.non_finite, 0);
         assert!(figures.held_out_before.unwrap() > 0.99 && figures.held_out_bent_before.unwrap() > 0.99, "{figures:?}");
         // Paths end by chance: one has a deviation of about a half of the mean, 100 rows of 32 paths a probe 1 %.
@@ -334,10 +334,49 @@ fn threads_make_no_difference_and_seeds_do() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let mut volume = over(&scene, 2.0, &harmonics(None, true));
         let rows = RowSettings { rows_per_probe: 20, paths: 4, ..RowSettings::default() };
-        let figures = pool.install(|| run(&Fit::Rows(rows), &world, &untested(), &mut volume, seed, |_| ())).unwrap();
+        let figures =
+            pool.install(|| run(&Fit::Rows(rows), &world, &untested(), &mut volume, seed, &mut (), |_| ())).unwrap();
         (volume.irradiance, figures.record())
     };
     let one = fitted(1, 3);
     assert!(one == fitted(2, 3) && one == fitted(3, 3));
     assert!(one.0 != fitted(1, 4).0);
+}
+
+/// What a fit before has kept.
+#[derive(Default)]
+struct Memory {
+    blocks: std::collections::BTreeMap<u32, Vec<u8>>,
+    kept: usize,
+}
+
+impl Traced for Memory {
+    fn known(&mut self, block: u32) -> Option<Vec<u8>> {
+        self.blocks.get(&block).cloned()
+    }
+
+    fn keep(&mut self, block: u32, bytes: &[u8]) {
+        self.kept += 1;
+        self.blocks.insert(block, bytes.to_vec());
+    }
+}
+
+#[test]
+fn light_that_was_kept_is_not_traced_again() {
+    let scene = load("two_rooms_open");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let fitted = |memory: &mut Memory| {
+        let mut volume = over(&scene, 2.0, &harmonics(None, true));
+        let rows = RowSettings { rows_per_probe: 400, paths: 1, ..RowSettings::default() };
+        let figures = run(&Fit::Rows(rows), &world, &untested(), &mut volume, 1, memory, |_| ()).unwrap();
+        (volume.irradiance, FitFigures { time_s: 0.0, ..figures })
+    };
+    let mut memory = Memory::default();
+    let first = fitted(&mut memory);
+    let blocks = memory.kept;
+    assert!(blocks > 1 && fitted(&mut memory) == first && memory.kept == blocks);
+    // What is missing or of another length is traced again.
+    memory.blocks.insert(0, vec![0; 60]);
+    memory.blocks.remove(&1);
+    assert!(fitted(&mut memory) == first && memory.kept == blocks + 2);
 }

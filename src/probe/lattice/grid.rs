@@ -95,6 +95,13 @@ impl Grid {
         })
     }
 
+    /// Some points of it, from `first` on, as a uniform grid of their own.
+    pub fn part(&self, first: UVec3, divisions: UVec3) -> Grid {
+        let shift = first.as_vec3() * self.spacing;
+        let (origin_world, origin) = (self.origin_world + shift.as_dvec3(), self.origin + shift);
+        Grid { origin_world, origin, divisions, spacing: self.spacing, tree: None }
+    }
+
     /// The same points with a file's index of a mixed grid of so many levels.
     ///
     /// # Errors

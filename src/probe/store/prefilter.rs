@@ -110,9 +110,11 @@ mod tests {
             let light = filtered(kernel, &sky);
             let at = ((oct_from_direction(below) * 0.5 + 0.5) * n as f32).as_uvec2().min(UVec2::splat(n as u32 - 1));
             let found = light[at.x as usize + n * at.y as usize].x;
-            assert!(found >= last, "{n}: {found} after {last}");
+            // The coarsest texels lie on the horizon, and see half of the sky to within some texels of the finest level.
+            assert!(found > last - 0.05, "{n}: {found} after {last}");
             last = found;
         }
+        assert!(last > 0.3, "{last}");
         let lobe = lobe(1.0);
         let all: f32 = lobe.iter().map(|(_, w)| w).sum();
         let above: f32 = lobe.iter().filter(|(d, _)| d.x > 0.0).map(|(_, w)| w).sum();

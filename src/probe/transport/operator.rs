@@ -5,7 +5,6 @@
 //! through probes.
 
 use std::f32::consts::PI;
-use std::time::Instant;
 
 use glam::{Vec3, Vec3A};
 use rayon::prelude::*;
@@ -20,6 +19,7 @@ use crate::probe::capture::{ProbeCapture, Seen};
 use crate::probe::lattice::ProbeState;
 use crate::probe::query::{Query, QueryPoint, QuerySettings, Visibility};
 use crate::probe::store::kernel::Kernel;
+use crate::system::processor::processor_seconds;
 
 /// Where the captures of all probes come from: memory, or traced again.
 pub trait Captures: Sync {
@@ -242,13 +242,13 @@ impl<C: Captures> Operator<'_, C> {
         }
     }
 
-    /// Seconds that one application at these probes takes.
+    /// Seconds of the processor that one application at these probes takes.
     pub fn time(&self, volume: &Volume, probes: &[usize]) -> f64 {
         let masks: Vec<Vec<u8>> = probes.par_iter().map(|&p| self.masks_of(volume, p)).collect();
-        let started = Instant::now();
+        let started = processor_seconds();
         let apply = |(&p, masks): (&usize, &Vec<u8>)| self.apply_to(volume, p, Some(masks));
         std::hint::black_box(probes.par_iter().zip(&masks).map(apply).collect::<Vec<_>>());
-        started.elapsed().as_secs_f64()
+        processor_seconds() - started
     }
 
     /// How a probe asks for the light at one of its surfels. What the method does not look at is left zero.

@@ -82,7 +82,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
     let mut textures = Textures::new(&document, &buffers, &mut inputs, options.collapse_constant_images);
     let materials = Materials::load(&document, &draws, &mut textures, options, &mut warnings)?;
     coordinates::check(&mut draws, &materials, &textures.constant, &mut warnings)?;
-    let textures = textures.textures;
+    let (textures, collapsed_bytes) = (textures.textures, textures.collapsed_bytes);
     let Flattened { mut mesh, centre, dropped } = flatten(&draws, &landmark, &materials);
     report_dropped(&dropped, &mut warnings);
     if mesh.triangles.is_empty() {
@@ -107,6 +107,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
         mesh,
         materials: materials.materials,
         textures,
+        collapsed_bytes,
         lights,
         cameras,
         environment,

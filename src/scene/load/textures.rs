@@ -33,6 +33,8 @@ pub(super) struct Textures<'a> {
     pub least_alpha: Vec<f32>,
     /// Whether all texels of a texture are equal.
     pub constant: Vec<bool>,
+    /// Memory that these do not take, as one texel stands for all, bytes.
+    pub collapsed_bytes: u64,
 }
 
 /// Uses of an image that are equal in these four share one texture.
@@ -63,6 +65,7 @@ impl<'a> Textures<'a> {
             textures: Vec::new(),
             least_alpha: Vec::new(),
             constant: Vec::new(),
+            collapsed_bytes: 0,
         }
     }
 
@@ -91,7 +94,9 @@ impl<'a> Textures<'a> {
                     16
                 }
             };
-            self.budget.release(u64::from(width) * u64::from(height), bytes);
+            let all = u64::from(width) * u64::from(height);
+            self.budget.release(all, bytes);
+            self.collapsed_bytes += (all - 1) * bytes;
             (width, height) = (1, 1);
         }
         let index = TextureIndex(self.textures.len() as u32);

@@ -14,6 +14,10 @@ pub enum OutputError {
     Denied { path: PathBuf, folder: PathBuf },
     #[error("cannot write {path}: the disk is full; free some space or choose another disk")]
     Full { path: PathBuf },
+    #[error(
+        "cannot write {path}: a file of that size is beyond the limit for this process; raise the limit (`ulimit -f unlimited`)"
+    )]
+    TooLarge { path: PathBuf },
     #[error("cannot write {path}: it exists and is not a regular file; give the name of a file")]
     NotAFile { path: PathBuf },
     #[error("cannot write {path}: {blocker} is not a folder; choose another path")]
@@ -45,6 +49,7 @@ pub(super) fn output_error(path: &Path, folder: &Path, cause: io::Error) -> Outp
         ErrorKind::NotFound | ErrorKind::NotADirectory if !folder.is_dir() => missing_folder(&path, &folder),
         ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => OutputError::Denied { path, folder },
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => OutputError::Full { path },
+        ErrorKind::FileTooLarge => OutputError::TooLarge { path },
         ErrorKind::IsADirectory => OutputError::NotAFile { path },
         _ => OutputError::Other { path, cause },
     }

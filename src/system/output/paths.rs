@@ -3,6 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// Start of the names of temporary files and folders. They lie beside the output until they are renamed.
+pub(super) const TEMPORARY_PREFIX: &str = ".lightprobe-";
+
 /// The path at the end of all symbolic links. It need not exist yet.
 pub(super) fn link_target(path: &Path) -> PathBuf {
     /// Linux follows as many before it gives up.

@@ -9,8 +9,8 @@ use nix::errno::Errno;
 use nix::fcntl::{AT_FDCWD, RenameFlags, renameat2};
 
 use super::error::{OutputError, output_error};
-use super::paths::{folder_of, link_target};
-use super::write::{TEMPORARY_PREFIX, write_atomically};
+use super::paths::{TEMPORARY_PREFIX, folder_of, link_target};
+use super::write::write_atomically;
 
 /// Part of the name of the copy that will take a folder's place.
 const NEW: &str = "new";

@@ -1,26 +1,19 @@
 //! Writing a file so that it appears whole or not at all.
 
-use std::fs::{self, File, Permissions};
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
-use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 use super::check::check_folder;
 use super::error::{OutputError, output_error};
 use super::paths::{folder_of, link_target};
-
-/// Mode of a new file, from which the kernel removes the bits of the umask. The temporary-file crate would make the
-/// file private to its owner (0600).
-const MODE_BEFORE_UMASK: u32 = 0o666;
-
-/// Start of the temporary file's name. The file lies beside the output until it is renamed.
-pub(super) const TEMPORARY_PREFIX: &str = ".lightprobe-";
+use super::pending::Pending;
 
 /// What a writer writes into. It can seek, which the table of offsets in an EXR file needs.
 pub type OutputFile<'a> = BufWriter<&'a mut File>;
 
-/// Writes `path` through a temporary file in the same folder. The temporary file is synced to the disk and then
-/// renamed, so readers see the old file or the new one and never a part. An existing file is replaced. If `path` is a
+/// Writes `path` through a [`Pending`] file in the same folder. That file is synced to the disk and then gets its name,
+/// so readers see the old file or the new one and never a part. An existing file is replaced. If `path` is a
 /// symbolic link, the file behind it is replaced and the link stays.
 ///
 /// # Errors
@@ -37,17 +30,13 @@ pub fn write_atomically(
     let target = link_target(path);
     let folder = folder_of(&target);
     let written = (|| {
-        let mut temporary = tempfile::Builder::new()
-            .prefix(TEMPORARY_PREFIX)
-            .suffix(".tmp")
-            .permissions(Permissions::from_mode(MODE_BEFORE_UMASK))
-            .tempfile_in(folder)?;
-        let mut file = BufWriter::new(temporary.as_file_mut());
+        let mut pending = Pending::create(folder)?;
+        let mut file = BufWriter::new(pending.file());
         write(&mut file)?;
         file.flush()?;
         drop(file);
-        temporary.as_file().sync_all()?;
-        temporary.persist(&target).map_err(|failed| failed.error)?;
+        pending.file().sync_all()?;
+        pending.persist(&target)?;
         // The folder holds the new name, so it is synced too. Some file systems cannot sync a folder; the error is
         // ignored, because the file's content is on the disk already.
         let _ = File::open(folder).and_then(|folder| folder.sync_all());

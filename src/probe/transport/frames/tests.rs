@@ -192,11 +192,11 @@ fn frames_go_on_from_a_checkpoint_as_if_nothing_had_happened() {
     let start = || Volume { occlusion: Occlusion::Moments(maps.clone()), ..volume(IrradianceCurve::Gamma5Over2Pi) };
     let mut whole = start();
     let solution = solve(&operator, &settings, &mut whole, Progress::default(), |state, volume| {
-        checkpoint::write(&path(state.solution.bounces.len()), "this bake", state, volume).unwrap();
+        std::fs::write(path(state.solution.bounces.len()), checkpoint::pack(state, volume)).unwrap();
     });
     for frames in [1, 33, 90] {
         let mut volume = Volume { occlusion: Occlusion::Moments(maps.clone()), ..start() };
-        let state = checkpoint::read(&path(frames), "this bake", &mut volume).unwrap();
+        let state = checkpoint::unpack(&std::fs::read(path(frames)).unwrap(), &mut volume).unwrap();
         assert_eq!(solve(&operator, &settings, &mut volume, state, |_, _| {}), solution, "from frame {frames}");
         assert_eq!((&volume.irradiance, &volume.occlusion), (&whole.irradiance, &whole.occlusion));
     }

@@ -63,7 +63,7 @@ pub fn pixels_of_bevy_are_those_of_render() {
     }
 }
 
-/// Where a driver has no arrays of textures, as Mesa's lavapipe 22.3 has none, Bevy reads the texture of the volume that is
+/// Where a driver has no arrays of textures, and so it looks on lavapipe of Mesa 22.3, Bevy reads the texture of the volume that is
 /// nearest to the camera for all volumes. So each camera sees one room alone here.
 pub fn several_volumes_in_bevy_are_those_of_render() {
     let folder = tempfile::tempdir().unwrap();

@@ -377,6 +377,6 @@ fn light_that_was_kept_is_not_traced_again() {
     assert!(blocks > 1 && fitted(&mut memory) == first && memory.kept == blocks);
     // What is missing or of another length is traced again.
     memory.blocks.insert(0, vec![0; 60]);
-    memory.blocks.remove(&1);
+    memory.blocks.pop_last();
     assert!(fitted(&mut memory) == first && memory.kept == blocks + 2);
 }

@@ -27,7 +27,8 @@ mod tests {
         let bounces = |tolerance, max_bounces| {
             Transport::Bounces(BounceSettings { tolerance, max_bounces, ..BounceSettings::default() })
         };
-        assert_eq!(bounces(1e-4, None).steps_done(1.0, 1e-2, 3), FINE_STEPS / 2);
+        // The logarithms of f32 fall short of halfway by less than a step.
+        assert!((FINE_STEPS / 2 - 1..=FINE_STEPS / 2).contains(&bounces(1e-4, None).steps_done(1.0, 1e-2, 3)));
         assert_eq!(bounces(1e-4, Some(4)).steps_done(1.0, 0.9, 3), 3 * FINE_STEPS / 4);
         assert_eq!(bounces(1e-4, None).steps_done(0.0, 0.0, 0), 0);
     }

@@ -197,13 +197,14 @@ pub fn a_keyboard_is_enough() {
         "skip|",
         "#gates|",
         "theme scripted|",
+        // The worst pair stands before the gates, the others after.
+        "out|image-2|",
+        "failing-only|",
         "out|image-1|",
         "worst|image-1|",
         "range|image-1|",
         "compare|image-1|",
         "heat|image-1|",
-        "failing-only|",
-        "out|image-2|",
     ];
     let places: Vec<usize> = order.iter().map(|what| place(what)).collect();
     assert!(places.is_sorted(), "{order:?} at {places:?}");

@@ -147,7 +147,7 @@ fn interruptions_say_what_is_left() {
     }
     let unsaved = bake.folder.path().join("b.probes");
     let mut child = command();
-    child.args(["bake", text(&bake.scene), "-o", text(&unsaved), "--set", "grid.spacing_m=0.3"]);
+    child.args(["bake", text(&bake.scene), "-o", text(&unsaved), "--set", "grid.spacing_m=0.1"]);
     let child = child.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     std::thread::sleep(Duration::from_millis(300));
     kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).unwrap();
@@ -189,11 +189,6 @@ fn a_limit_of_file_size_is_an_error_like_others() {
     let message = one_error(&with_files_of(2, &plain));
     assert!(message.contains("a.probes") && message.contains("ulimit -f"), "{message}");
     assert_eq!(names_in(bake.folder.path()), [""; 0]);
-    // What was saved before the limit is gone on from.
-    let message = one_error(&with_files_of(200, &bake.arguments(&output, &["-q"])));
-    assert!(message.contains("ulimit -f") && message.contains("a.probes.resume keeps the work"), "{message}");
-    assert_eq!(names_in(bake.folder.path()), ["a.probes.resume"]);
-    assert!(bake.resumed() == whole);
     // Room for the result, but not for the work.
     let blocks = (whole.len() / 512 + 2) as u32;
     let tight = with_files_of(blocks, &bake.arguments(&output, &[]));

@@ -147,7 +147,16 @@ fn interruptions_say_what_is_left() {
     }
     let unsaved = bake.folder.path().join("b.probes");
     let mut child = command();
-    child.args(["bake", text(&bake.scene), "-o", text(&unsaved), "--set", "grid.spacing_m=0.1"]);
+    child.args([
+        "bake",
+        text(&bake.scene),
+        "-o",
+        text(&unsaved),
+        "--preset",
+        "physical",
+        "--set",
+        "grid.spacing_m=0.1",
+    ]);
     let child = child.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     std::thread::sleep(Duration::from_millis(300));
     kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).unwrap();

@@ -19,6 +19,8 @@ const PROBE_BYTES: u64 = size_of::<Option<ProbeCapture>>() as u64 + 160;
 
 /// A captured surface with the mask that the bounces keep of it.
 const SURFEL_BYTES: u64 = size_of::<Surfel>() as u64 + 1;
+/// A ray that met something that emits, in a list that grows by doubling, and packed for the file.
+const EMITTED_BYTES: u64 = 3 * size_of::<(u32, glam::Vec3)>() as u64;
 
 /// Bytes of a bake's large arrays, by what they grow with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,12 +54,14 @@ impl Memory {
             + traced;
         let (resampling, resampled) = config.capture.rays.resampling_bytes();
         let survey = store.occlusion.survey_voxels();
+        // A capture is there once more while it is packed for the file.
+        let in_hand = surfels_bytes(config) + config.capture.rays.kept() as u64 * EMITTED_BYTES;
         Memory {
             probes: probes * PROBE_BYTES,
             survey: survey.map_or(0, |voxels| survey::estimated_bytes(mesh, grid, voxels)),
             kernels: store.irradiance.filter_bytes(texels) + distance_kernel + resampling,
             maps: probes * per_probe + history,
-            in_flight: (surfels_bytes(config) + distances + resampled) * rayon::current_num_threads() as u64,
+            in_flight: (surfels_bytes(config) + in_hand + distances + resampled) * rayon::current_num_threads() as u64,
             fit: fit::bytes(&config.fit, probes, unknowns as u64),
         }
     }

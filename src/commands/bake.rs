@@ -68,13 +68,15 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
 /// Writes the file, and removes what was saved on the way. Where it cannot be written, that is kept.
 fn write(baked: &Baked, output: &Path) -> Result<u64> {
     let saved = saving::path_for(output);
-    let written = baked.container.write(output);
-    if written.is_err() && journal::is_journal(&saved) {
-        let saved = saved.display();
-        return Err(anyhow!("{}; {saved} keeps the work, --resume goes on from it", written.unwrap_err()));
+    match baked.container.write(output) {
+        Err(error) if journal::is_journal(&saved) => {
+            Err(anyhow!("{error}; {} keeps the work, --resume goes on from it", saved.display()))
+        }
+        written => {
+            journal::remove(&saved);
+            Ok(written?)
+        }
     }
-    journal::remove(&saved);
-    Ok(written?)
 }
 
 /// Says what was done.

@@ -151,7 +151,7 @@ const NODES: [u64; BLOCK as usize] = {
 fn scrambled(value: u32, random: u32) -> u32 {
     /// Brings the lowest bit of quarter k to bit 48 + k; all other products lie elsewhere.
     const GATHER: u64 = 1 << 48 | 1 << 33 | 1 << 18 | 1 << 3;
-    let chosen = u64::from(random & ((1 << TREE_BITS) - 1)) * IN_QUARTERS & NODES[(value & (BLOCK - 1)) as usize];
+    let chosen = (u64::from(random & ((1 << TREE_BITS) - 1)) * IN_QUARTERS) & NODES[(value & (BLOCK - 1)) as usize];
     // The top bit of a quarter is then whether any of it is set.
     let set = (chosen + IN_QUARTERS * 0x7FFF) >> 15 & IN_QUARTERS;
     value ^ (set.wrapping_mul(GATHER) >> 48) as u32 & (BLOCK - 1)

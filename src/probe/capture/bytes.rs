@@ -63,13 +63,22 @@ fn two_vectors((a, b): &(Vec3, Vec3)) -> [u8; 24] {
     floats([a.x, a.y, a.z, b.x, b.y, b.z])
 }
 
+/// Bytes of a packed capture: with room for all of it the writer does not grow, which would take twice as much.
+fn packed_bytes(capture: &ProbeCapture, filtered: &[Vec2]) -> usize {
+    /// Counts and lengths of lists.
+    const NUMBERS: usize = 6 + 7;
+    let ProbeCapture { surfels, geometric, emitted, emitter_samples, seen, backs, .. } = capture;
+    let lists = surfels.len() * Surfel::BYTES + geometric.len() * 4 + emitted.len() * 16 + emitter_samples.len() * 24;
+    8 * NUMBERS + lists + seen.len() * 20 + backs.len() * 4 + filtered.len() * 8
+}
+
 /// A capture whose distances have been filtered, and these filtered distances. Inverse: [`unpack`].
 pub fn pack(capture: &ProbeCapture, filtered: &[Vec2]) -> Vec<u8> {
-    let mut out = Writer(Vec::with_capacity(256 + capture.surfels.len() * Surfel::BYTES));
+    let mut out = Writer(Vec::with_capacity(packed_bytes(capture, filtered)));
     let RayCount { primary, shadow } = capture.rays;
     let counts = [capture.hits_outside_volume, capture.non_finite, capture.light_clamped];
     [capture.texels as u64, primary, shadow].into_iter().chain(counts).for_each(|number| out.number(number));
-    out.list(&capture.surfels, Surfel::to_bytes);
+    out.list(&capture.surfels, |surfel| surfel.to_bytes());
     out.list(&capture.geometric, |normal| normal.to_bytes());
     out.list(&capture.emitted, texel_and_light);
     out.list(&capture.emitter_samples, two_vectors);

@@ -129,7 +129,7 @@ impl Surfel {
     pub(super) const BYTES: usize = 39;
 
     /// Little-endian, in the order of the fields. Inverse: [`Self::of_bytes`].
-    pub(super) fn to_bytes(&self) -> [u8; Self::BYTES] {
+    pub(super) fn to_bytes(self) -> [u8; Self::BYTES] {
         let mut bytes = [0; Self::BYTES];
         let numbers = self.position.to_array().into_iter().chain(self.direct_radiance.to_array()).map(f32::to_bits);
         let numbers = numbers.chain([self.texel]).map(u32::to_le_bytes);

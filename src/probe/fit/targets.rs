@@ -79,7 +79,7 @@ pub fn trace(
     let tracer = Tracer { world, path: &path, seed };
     let mut tallies = vec![Tally::default(); asked.len()];
     let first = |index: usize, tally: &mut Tally| {
-        if index % STEP == 0 {
+        if index.is_multiple_of(STEP) {
             advance(STEP as u64);
         }
         tracer.add(&asked[index], index, 0..settings.paths, tally);
@@ -112,7 +112,7 @@ fn in_blocks(tallies: &mut [Tally], pass: u32, traced: &mut impl Traced, add: im
             }
             None => {
                 part.par_iter_mut().enumerate().for_each(|(i, tally)| add(block * AT_ONCE + i, tally));
-                traced.keep(key, part.iter().map(Tally::to_bytes).collect::<Vec<_>>().as_flattened());
+                traced.keep(key, part.iter().map(|tally| tally.to_bytes()).collect::<Vec<_>>().as_flattened());
             }
         }
     }
@@ -155,7 +155,7 @@ impl Tally {
     const BYTES: usize = 60;
 
     /// Little-endian. Inverse: [`Self::of_bytes`].
-    fn to_bytes(&self) -> [u8; Tally::BYTES] {
+    fn to_bytes(self) -> [u8; Tally::BYTES] {
         let [a, b] = self.sums;
         let floats = [a.x, a.y, a.z, b.x, b.y, b.z, self.squares].map(f32::to_bits);
         let long = [self.rays.primary, self.rays.shadow, self.non_finite];

@@ -112,16 +112,7 @@ impl<'a> Saving<'a> {
     /// # Errors
     /// As those of [`check`].
     pub fn new(checkpoint: Option<&'a Checkpoint>, identity: String) -> Result<Saving<'a>, FileError> {
-        let mut saving = Saving {
-            checkpoint,
-            identity,
-            journal: None,
-            found: BTreeMap::new(),
-            saved: Saved::of(&[]),
-            captures_end: 0,
-            last: Instant::now(),
-            failure: None,
-        };
+        let mut saving = Saving { checkpoint, identity, ..Saving::nothing() };
         if let Some(Checkpoint { path, resume: true, .. }) = checkpoint
             && path.exists()
         {

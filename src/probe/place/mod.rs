@@ -14,6 +14,7 @@ mod settings;
 mod settle;
 mod stage;
 pub mod survey;
+mod tally;
 #[cfg(test)]
 mod tests;
 mod walls;

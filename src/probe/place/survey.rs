@@ -10,6 +10,7 @@ use super::overlap::triangle_meets_box;
 use super::piece::Piece;
 use super::placement::Placement;
 use super::settings::SurveySettings;
+use super::tally::Tally;
 use crate::light::World;
 use crate::light::contact::{Facet, sight_line};
 use crate::math::random::{KroneckerSequence, Purpose, Random, unit_from_bits};
@@ -90,32 +91,6 @@ struct Side {
     triangle: TriangleIndex,
     /// Whether this is the back of the triangle.
     is_back: bool,
-}
-
-/// What points of a voxel's surfaces see.
-#[derive(Debug, Clone, Copy, Default)]
-struct Tally {
-    /// At most eight for each point.
-    rays: u64,
-    /// Points that see any probe at all. The others mostly lie inside solids where walls meet, and have no vote.
-    points: u32,
-    /// Off one of the others that lies in the open: what it faces is no back, nor so close that no one can be there.
-    open: Option<Vec3>,
-    /// How many points see each corner.
-    visible: [u32; 8],
-}
-
-impl Tally {
-    fn agrees(&self) -> bool {
-        self.visible.iter().all(|&v| v == 0 || v == self.points)
-    }
-
-    /// Corners that more than half of the points see, or else those that the most see.
-    fn majority(&self) -> u8 {
-        let most = self.visible.into_iter().max().unwrap_or(0);
-        let enough = most.min(self.points / 2 + 1);
-        (0..8).fold(0, |mask, i| mask | u8::from(enough > 0 && self.visible[i] >= enough) << i)
-    }
 }
 
 /// What is known of one side of a voxel.

@@ -9,6 +9,10 @@
 //! A light field that rays march through ([`crate::probe::query::march`]) has normals of two bytes and a level of lowest
 //! distances, each the least of the texels below it: `R′²·(4 + 2 + 2) + M²·2` bytes.
 
+mod levels;
+#[cfg(test)]
+mod tests;
+
 use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3, Vec3A};
@@ -16,6 +20,8 @@ use half::f16;
 use safetensors::Dtype;
 use serde::{Deserialize, Serialize};
 
+pub use self::levels::lowest_of;
+use self::levels::{halved, shrunk};
 use super::encode::{ColorFormat, decode_colors, encode_colors};
 use super::kernel::Kernel;
 use super::map::{OctahedralMaps, fill_with_border, interior_texel};
@@ -345,46 +351,6 @@ impl Radiance {
     }
 }
 
-/// The mean of every 2×2 texels; `n` texels per side are left.
-fn halved(texels: &[Vec3], n: usize) -> Vec<Vec3> {
-    let at = |x: usize, y: usize| texels[x + 2 * n * y];
-    (0..n * n)
-        .map(|o| {
-            let (x, y) = (2 * (o % n), 2 * (o / n));
-            0.25 * (at(x, y) + at(x + 1, y) + at(x, y + 1) + at(x + 1, y + 1))
-        })
-        .collect()
-}
-
-/// The least distance of every block of texels; `n` blocks per side are left.
-pub fn lowest_of(distances: &[f32], side: usize, n: usize) -> Vec<f32> {
-    let block = side / n;
-    let mut out = vec![f32::INFINITY; n * n];
-    for (o, &distance) in distances.iter().enumerate() {
-        let least = &mut out[o % side / block + n * (o / side / block)];
-        *least = least.min(distance);
-    }
-    out
-}
-
-/// The mean over the area of each of `side`² texels of a map of `n`², n at most 2·`side` + 1.
-fn shrunk(texels: &[Vec3], n: usize, side: usize) -> Vec<Vec3> {
-    let width = n as f32 / side as f32;
-    // Texels that a new one meets along an axis, with their shares.
-    let met = |i: usize| {
-        let (low, high) = (i as f32 * width, (i + 1) as f32 * width);
-        (low as usize..(high.ceil() as usize).min(n)).map(move |t| {
-            let share = (high.min((t + 1) as f32) - low.max(t as f32)) / width;
-            (t, share.max(0.0))
-        })
-    };
-    let mean = |o: usize| {
-        let rows = met(o / side).flat_map(|(y, v)| met(o % side).map(move |(x, u)| (x + n * y, u * v)));
-        rows.map(|(t, share)| texels[t] * share).sum()
-    };
-    (0..side * side).map(mean).collect()
-}
-
 /// A coordinate of `oct` in a byte; inverse of [`oct_of`].
 fn byte_of(x: f32) -> u8 {
     (x.clamp(-1.0, 1.0) * 127.5 + 127.5).round() as u8
@@ -451,97 +417,4 @@ fn read_colors(
         return Err(format!("tensor '{name}' holds numbers that are not finite"));
     }
     Ok((OctahedralMaps { resolution: tensor.map_resolution(name, border)?, border, texels }, format))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn store(prefiltered: &[usize]) -> RadianceStore<'_> {
-        RadianceStore {
-            light_field: LightFieldStore::Maps,
-            prefiltered,
-            prefilter: Prefilter::Halved,
-            format: ColorFormat::R11G11B10F,
-            border: 1,
-        }
-    }
-
-    #[test]
-    fn what_is_seen_comes_back_from_the_file() {
-        let mut radiance = store(&[4, 2]).zeros(2, 4);
-        let light: Vec<Vec3A> = (0..16).map(|o| Vec3A::splat(1.0 + o as f32)).collect();
-        radiance.set(1, &light, |o| (o % 3 > 0).then_some((Vec3::Y, o as f32)));
-        // Level 1: the means of 1, 2, 5, 6 and so on, exact in 6 bits.
-        let coarse = &radiance.prefiltered[1];
-        let means: Vec<f32> = [(1, 1), (2, 1), (1, 2), (2, 2)].map(|(c, r)| coarse.probe(1)[c + 4 * r].x).to_vec();
-        assert_eq!(means, [3.5, 5.5, 11.5, 13.5]);
-        let mut container = Container::default();
-        radiance.write(&mut container, &mut EncodingLosses::default());
-        let read = Radiance::read(&container, 2, 1).unwrap();
-        let (a, b) = (radiance.light_field.as_ref().unwrap(), read.light_field.as_ref().unwrap());
-        assert_eq!((&a.normal, &a.distance), (&b.normal, &b.distance));
-        assert_eq!(read.prefiltered.len(), 2);
-        // Half a step of 5 bits.
-        let near = |a: &Vec3, b: &Vec3| (*a - *b).abs().max_element() <= a.max_element() / 64.0;
-        assert!(a.radiance.texels.iter().zip(&b.radiance.texels).all(|(a, b)| near(a, b)));
-        // What the layout counts is what the file holds.
-        let bytes: usize = container.tensors.values().map(|t| t.bytes.len()).sum();
-        let (field, levels) = store(&[4, 2]).runtime_bytes(4, true);
-        assert_eq!(bytes, 2 * (field + levels));
-        container.tensors.remove(NORMAL);
-        assert!(Radiance::read(&container, 2, 1).unwrap_err().contains("normal"));
-    }
-
-    #[test]
-    fn light_fields_to_march_through_come_back() {
-        let light_field = LightFieldStore::March { lowest: 2 };
-        let store = RadianceStore { light_field, border: 0, ..store(&[]) };
-        let mut radiance = store.zeros(1, 4);
-        radiance.set(0, &[Vec3A::ONE; 16], |o| (o != 5).then_some((Vec3::Y, 1.0 + o as f32)));
-        let field = radiance.light_field.as_ref().unwrap();
-        // Blocks of 2×2; the texel without a surface lies in the first.
-        assert_eq!(field.lowest.as_ref().unwrap().texels, [1.0, 3.0, 9.0, 11.0]);
-        let mut container = Container::default();
-        radiance.write(&mut container, &mut EncodingLosses::default());
-        let read = Radiance::read(&container, 1, 0).unwrap();
-        let again = read.light_field.as_ref().unwrap();
-        assert_eq!((&field.distance, &field.lowest), (&again.distance, &again.lowest));
-        // Half a step of 1/127.5.
-        let near = |(a, b): (&Vec2, &Vec2)| (*a - *b).abs().max_element() <= 0.5 / 127.5 + 1e-6;
-        assert!(field.normal.texels.iter().zip(&again.normal.texels).all(near));
-        let bytes: usize = container.tensors.values().map(|t| t.bytes.len()).sum();
-        assert_eq!(bytes, store.runtime_bytes(4, true).0);
-        assert_eq!(read.runtime_bytes(true), store.runtime_bytes(4, true));
-        for (side, border) in [(5, 0), (4, 1)] {
-            assert!(RadianceStore { border, ..store }.mismatch(Some(side)).is_some());
-        }
-    }
-
-    /// Odd sides: the mean over the area keeps constants and the sum.
-    #[test]
-    fn levels_are_made_of_light_fields() {
-        let mut radiance = store(&[]).zeros(1, 63);
-        let light: Vec<Vec3A> = (0..63 * 63).map(|o| Vec3A::splat((o % 63) as f32)).collect();
-        radiance.set(0, &light, |_| None);
-        radiance.make_levels();
-        let sides: Vec<usize> = radiance.prefiltered.iter().map(|maps| maps.resolution).collect();
-        assert_eq!(sides, [63, 31, 15, 7]);
-        for maps in &radiance.prefiltered {
-            let interior = interior_texel(maps.resolution, maps.border);
-            let n = maps.resolution * maps.resolution;
-            let mean = (0..n).map(|o| maps.probe(0)[interior(o)].x).sum::<f32>() / n as f32;
-            assert!((mean - 31.0).abs() < 1e-3, "{} texels: {mean}", maps.resolution);
-        }
-    }
-
-    #[test]
-    fn levels_halve_from_the_capture_on() {
-        assert_eq!(store(&[8, 4, 2, 1]).mismatch(Some(8)), None);
-        for (levels, side) in [(&[8, 2][..], Some(8)), (&[4], Some(8)), (&[9, 4], Some(9)), (&[8], None)] {
-            assert!(store(levels).mismatch(side).is_some(), "{levels:?} of {side:?}");
-        }
-        let nothing = RadianceStore { light_field: LightFieldStore::None, ..store(&[]) };
-        assert_eq!(nothing.mismatch(None), None);
-    }
 }

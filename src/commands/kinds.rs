@@ -39,7 +39,7 @@ fn kind_of(path: &Path) -> Option<&'static str> {
 /// Refuses what is surely no probe file. `usage` shows how the command is written.
 pub fn expect_probes(path: &Path, usage: &str) -> Result<()> {
     let kind = match path.is_dir() && !path.join(RECORD).exists() {
-        true => Some("a folder that `lightprobe export` did not write"),
+        true => Some("a folder without the probes.json of `lightprobe export`"),
         false => kind_of(path),
     };
     match kind {
@@ -79,7 +79,7 @@ mod tests {
             (&file("a.GLB", b""), "a scene"),
             (&report, "a JSON file"),
             (&picture, "a picture"),
-            (&folder.path().to_owned(), "a folder that"),
+            (&folder.path().to_owned(), "a folder without"),
         ] {
             let message = said(expect_probes(path, "inspect PROBES")).unwrap_err();
             assert!(message.contains(kind) && message.contains("write `lightprobe inspect PROBES`"), "{message}");

@@ -285,7 +285,7 @@ mod tests {
     #[test]
     fn presets_stand_in_columns_of_any_terminal() {
         let names: Vec<&str> = presets::PRESETS.iter().map(|preset| preset.name).collect();
-        for width in [None, Some(40), Some(80), Some(200)] {
+        for width in [None, Some(50), Some(80), Some(200)] {
             let lines = preset_lines(width);
             let firsts: Vec<&str> =
                 lines.iter().filter_map(|line| line.split(' ').next()).filter(|n| !n.is_empty()).collect();

@@ -52,14 +52,20 @@ pub fn without_parameters(value: &str) -> Option<String> {
 
 /// Serde's words for a value of another kind, without the names of types.
 pub fn in_plain_words(message: &str) -> String {
-    let Some((found, expected)) =
-        message.strip_prefix("invalid type: ").and_then(|rest| rest.split_once(", expected "))
-    else {
+    // Such as `()` in the place of a name; the names follow in quotes.
+    if let Some((found, expected)) =
+        message.strip_prefix("unknown variant ").and_then(|rest| rest.split_once(", expected "))
+    {
+        let names: Vec<&str> = expected.split('`').skip(1).step_by(2).collect();
+        return unknown_choice(found.trim_matches('`'), &names);
+    }
+    let misplaced = ["invalid type: ", "invalid value: "].iter().find_map(|kind| message.strip_prefix(kind));
+    let Some((found, expected)) = misplaced.and_then(|rest| rest.split_once(", expected ")) else {
         return message.to_owned();
     };
     let expected = match expected {
         "f32" | "f64" => "a number, such as 0.5",
-        "u32" | "usize" => "a whole number, such as 8",
+        "u32" | "u64" | "usize" => "a whole number from 0 up, such as 8",
         "a sequence" => "a list of texts, such as [\"visibility\"]",
         "a tuple of size 3" => "three numbers, such as (8, 4, 8)",
         "a boolean" => "true or false",
@@ -112,5 +118,24 @@ mod tests {
         }
         let message = unknown_key("seed", keys.into_iter());
         assert!(!message.contains("did you mean") && message.contains("spacing_m, bounds, grid, padding"), "{message}");
+    }
+
+    #[test]
+    fn no_words_of_a_programming_language() {
+        for (said, shown) in [
+            ("invalid type: string \"1m\", expected f64", "\"1m\" does not fit: write a number, such as 0.5"),
+            (
+                "invalid value: integer `-1`, expected usize",
+                "`-1` does not fit: write a whole number from 0 up, such as 8",
+            ),
+            ("unknown variant `()`, expected `none` or `rows`", "there is no choice '()'; the choices are none, rows"),
+            (
+                "unknown variant `f61`, expected one of `f32`, `f16`",
+                "there is no choice 'f61' (did you mean 'f16'?); the choices are f32, f16",
+            ),
+            ("something else", "something else"),
+        ] {
+            assert_eq!(in_plain_words(said), shown);
+        }
     }
 }

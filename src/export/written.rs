@@ -22,6 +22,7 @@ use crate::probe::query::{Answers, CornerWeights, QueryPoint, Visibility};
 use crate::probe::store::sh::ShStore;
 use crate::probe::store::{IrradianceStore, Occlusion};
 use crate::probe::{Grid, ProbeIndex, Volume};
+use crate::system::input::read_file;
 use crate::system::output::{OutputError, create_folder, write_atomically};
 
 /// Where probes come from.
@@ -170,12 +171,15 @@ impl Export {
     pub fn read(folder: &Path) -> Result<Export, ExportError> {
         let load = |name: &str| {
             let path = folder.join(name);
-            std::fs::read(&path).map_err(|source| ExportError::Unreadable { path, source })
+            read_file(&path).map_err(|source| ExportError::Unreadable { path, source })
         };
         let damaged = |what: String| ExportError::Damaged { path: folder.join(RECORD), what };
         let record: Record = serde_json::from_slice(&load(RECORD)?).map_err(|e| damaged(e.to_string()))?;
         if record.format != FORMAT {
             return Err(damaged(format!("its format is '{}', not {FORMAT}", record.format)));
+        }
+        if record.volumes.is_empty() {
+            return Err(damaged("it holds no volume".to_owned()));
         }
         let mut files = Vec::new();
         for volume in &record.volumes {

@@ -173,4 +173,14 @@ fn what_cannot_be_exported_is_refused() {
     std::fs::write(three.join("probes.0.bin"), &bytes[..bytes.len() - 2]).unwrap();
     let message = refuse(&["render", text(&rooms), text(&three), "-o", text(&shaded)]);
     assert!(message.contains("probes.0.bin") && message.contains("export it again"), "{message}");
+    // A device, which has no end, and no volume at all.
+    std::fs::remove_file(three.join("probes.0.bin")).unwrap();
+    std::os::unix::fs::symlink("/dev/zero", three.join("probes.0.bin")).unwrap();
+    let message = refuse(&["render", text(&rooms), text(&three), "-o", text(&shaded)]);
+    assert!(message.contains("probes.0.bin") && message.contains("not a regular file"), "{message}");
+    let mut record = record(&three);
+    record["volumes"] = Value::Array(Vec::new());
+    std::fs::write(three.join("probes.json"), record.to_string()).unwrap();
+    let message = refuse(&["render", text(&rooms), text(&three), "-o", text(&shaded)]);
+    assert!(message.contains("no volume") && message.contains("export it again"), "{message}");
 }

@@ -35,7 +35,7 @@ fn mistakes_are_told_with_what_was_meant() {
         (&["bake", rooms, "-o", output, "--set", "grid.spacing_m=1m"], &["write a number, such as 0.5"]),
         (&["bake", rooms, "-o", output, "--set", "grid.divisions=8"], &["three numbers, such as (8, 4, 8)"]),
         (&["bake", rooms, "-o", output, "--preset", "configs/presets/path.ron"], &["--config", "physical"]),
-        (&["help", "benches"], &["did you mean", "`lightprobe help` lists them"]),
+        (&["help", "probe"], &["did you mean", "`lightprobe help` lists them"]),
     ] {
         let message = refuse(arguments);
         for word in words {

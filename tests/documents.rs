@@ -206,7 +206,8 @@ fn links_lead_somewhere() {
 #[test]
 fn flags_of_documents_exist() {
     use clap::CommandFactory;
-    let mut known: Vec<String> = ["version", "help", "release", "test", "path", "ignored"].map(String::from).to_vec();
+    let mut known: Vec<String> =
+        ["version", "help", "release", "test", "path", "ignored", "nocapture"].map(String::from).to_vec();
     let mut command = lightprobe::cli::Cli::command();
     command.build();
     for command in command.get_subcommands() {

@@ -184,7 +184,7 @@ pub struct BakeArgs {
     /// Continue an interrupted bake of the same scene, configuration and seed from OUT.probes.resume: the result is that of
     /// one run.
     ///
-    /// Captured probes and iterations are not computed again; placement, and a fit, are.
+    /// Captured probes, iterations and the paths of a fit are not computed again; placement is.
     #[arg(long)]
     pub resume: bool,
     /// Save the work to OUT.probes.resume once the bake takes longer than this, and iterations as often: seconds, 0 for at

@@ -159,7 +159,7 @@ mod tests {
         assert_eq!(Config { transport: config.transport.clone(), ..bounces }, config);
         assert_eq!(encoding.store.irradiance.fineness().rounding, 2f64.powi(-24));
         assert!(variants(&encoding)[2].config.is_none());
-        let path = config.with_overrides(&["transport=paths(paths: 2)".to_owned()]).unwrap();
+        let path = config.clone().with_overrides(&["transport=paths(paths: 2)".to_owned()]).unwrap();
         assert!(variants(&path)[1].config.is_none());
         let fitted = Config { fit: Fit::Rows(RowSettings::default()), ..config };
         let [angular, bounces, _] = variants(&fitted);

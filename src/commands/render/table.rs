@@ -156,14 +156,19 @@ fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {
 /// What a method's gloss costs and how far it is off; `None` where it has none.
 fn glossy_line(method: &MethodReport) -> Option<String> {
     let glossy = method.glossy.as_ref()?;
+    // Mirrored lamps rule the one, all pixels alike the other.
+    let both = |error: &ErrorReport| {
+        let relmse = error.all.figures.relmse.map(|relmse| format!(", relmse {}", format::significant(relmse, 3)));
+        format!("{}{}", relative_rmse(&error.all), relmse.unwrap_or_default())
+    };
     let error = glossy.error_gltf.as_ref().map_or_else(String::new, |error| {
         let parts: Vec<String> = glossy
             .parts
             .iter()
-            .map(|part| format!("{} {}", part.name.replace('_', " "), relative_rmse(&part.error_gltf.all)))
+            .map(|part| format!("{} {}", part.name.replace('_', " "), both(&part.error_gltf)))
             .collect();
-        let parts = if parts.is_empty() { String::new() } else { format!(" ({})", parts.join(", ")) };
-        format!(", error_gltf {}{parts}", relative_rmse(&error.all))
+        let parts = if parts.is_empty() { String::new() } else { format!(" ({})", parts.join("; ")) };
+        format!(", error_gltf {}{parts}", both(error))
     });
     let traced = glossy.traced.map_or_else(String::new, |traced| {
         format!(

@@ -64,7 +64,7 @@ fn typical(configuration: &ConfigurationReport, figure: &str) -> Option<f64> {
 /// A row for each method.
 fn comparison(report: &SweepReport) -> String {
     let has_gloss = report.configurations.iter().any(|c| typical(c, "glossy_shade_ms").is_some());
-    let gloss = [("error_gltf", Column::Number), ("gloss shade", Column::Number), ("gloss per probe", Column::Number)];
+    let gloss = ["error_gltf", "relmse_gltf", "gloss shade", "gloss per probe"].map(|name| (name, Column::Number));
     let columns = [
         ("method", Column::Text),
         ("probes", Column::Number),
@@ -104,6 +104,7 @@ fn comparison(report: &SweepReport) -> String {
         ];
         if has_gloss {
             cells.push(share("error_gltf"));
+            cells.push(format::or_undefined(typical("relmse_gltf"), |relmse| format::significant(relmse, 3)));
             cells.push(format::or_undefined(typical("glossy_shade_ms"), |ms| format::seconds(ms / 1e3)));
             cells.push(format::or_undefined(typical("glossy_bytes_per_probe"), |b| format::bytes(b.round() as u64)));
         }

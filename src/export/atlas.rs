@@ -48,7 +48,7 @@ pub fn atlas<T: Copy + Default>(block: &Block, side: usize, of_probe: impl Fn(u3
 pub fn files(volume: &Volume) -> Result<(VolumeRecord, Vec<File>), ExportError> {
     let Fineness { resolution, .. } = volume.irradiance.fineness();
     let uniform = volume.grid.uniform();
-    let block = Block { first: uniform.origin(), spacing: uniform.spacing(), divisions: uniform.divisions(), start: 0 };
+    let block = Block::of(&uniform);
     let directions = (0..resolution * resolution).map(|o| texel_direction(o % resolution, o / resolution, resolution));
     let settings = QuerySettings::default();
     let reader = Reader::new(Query { volume, settings: &settings }, Form::Along(directions.collect()));

@@ -24,6 +24,11 @@ pub const NOTE: &str = "Irradiance ÷ π along +x, −x, +y, −y, +z, −z, lin
     all light that bounced, and with that of emissive surfaces and of the sky: add punctual lights with shadows, and \
     no ambient light (GlobalAmbientLight::NONE) or environment map.";
 
+/// Texels along each axis.
+fn size(block: &Block) -> UVec3 {
+    block.divisions * UVec3::new(1, 2, 3)
+}
+
 /// Where the face lies that holds axis `axis`, in its negative direction where `negative`.
 fn texel(block: &Block, coordinate: UVec3, axis: u32, negative: bool) -> usize {
     let UVec3 { x, y, z } = block.divisions;
@@ -51,8 +56,7 @@ pub fn files(grids: &Grids, block: &Block, record: &mut VolumeRecord) -> Vec<Fil
         "scale": each(|low, high| high - low),
         "intensity": intensity,
     });
-    let size = block.divisions * UVec3::new(1, 2, 3);
-    vec![File { name: record.file.clone(), bytes: ktx2(size, &texels) }]
+    vec![File { name: record.file.clone(), bytes: ktx2(size(block), &texels) }]
 }
 
 /// A power of two that brings radiance into the range of the format: 1 wherever it fits.
@@ -69,8 +73,7 @@ fn intensity(grids: &Grids, block: &Block) -> f32 {
 /// # Errors
 /// The file is not of this volume.
 pub fn read(grids: &mut Grids, block: &Block, record: &VolumeRecord, bytes: &[u8]) -> Result<(), String> {
-    let size = block.divisions * UVec3::new(1, 2, 3);
-    let texels = read_ktx2(size, bytes).map_err(|what| format!("{}: {what}", record.file))?;
+    let texels = read_ktx2(size(block), bytes).map_err(|what| format!("{}: {what}", record.file))?;
     let intensity = record.engine["intensity"].as_f64().map(|intensity| intensity as f32);
     let Some(intensity) = intensity.filter(|intensity| *intensity > 0.0 && intensity.is_finite()) else {
         return Err(format!("{}: its volume has no intensity", record.file));

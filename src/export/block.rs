@@ -2,7 +2,7 @@
 
 use glam::{UVec3, Vec3};
 
-use crate::probe::ProbeIndex;
+use crate::probe::{Grid, ProbeIndex};
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Block {
@@ -21,6 +21,11 @@ impl Block {
     pub fn filling(low: Vec3, high: Vec3, divisions: UVec3, start: u32) -> Block {
         let spacing = (high - low) / divisions.as_vec3();
         Block { first: low + 0.5 * spacing, spacing, divisions, start }
+    }
+
+    /// All points of a uniform lattice.
+    pub fn of(grid: &Grid) -> Block {
+        Block { first: grid.origin(), spacing: grid.spacing(), divisions: grid.divisions(), start: 0 }
     }
 
     pub fn count(&self) -> usize {

@@ -8,7 +8,7 @@
 
 use std::f32::consts::TAU;
 
-use glam::{DVec3, Vec2, Vec3, Vec3A};
+use glam::{DVec3, UVec3, Vec2, Vec3, Vec3A};
 use rayon::prelude::*;
 use serde_json::json;
 
@@ -92,7 +92,7 @@ impl Ddgi {
     /// It has none, and there is no scene to trace them in.
     pub fn of(volume: &Volume, query: &QuerySettings, world: Option<&World>) -> Result<(Ddgi, Notes), String> {
         let grid = volume.grid.uniform();
-        let block = Block { first: grid.origin(), spacing: grid.spacing(), divisions: grid.divisions(), start: 0 };
+        let block = Block::of(&grid);
         let directions =
             (0..IRRADIANCE * IRRADIANCE).map(|o| texel_direction(o % IRRADIANCE, o / IRRADIANCE, IRRADIANCE));
         let reader = Reader::new(Query { volume, settings: query }, Form::Along(directions.collect()));
@@ -202,6 +202,14 @@ const KINDS: [Kind; 3] = [
     Kind { name: "data", side: 1, texels: Texels::Rgba16 },
 ];
 
+/// Where texel `o` of a probe's square lies among those of an array of planes.
+fn place(divisions: UVec3, side: usize, coordinate: UVec3, o: usize) -> usize {
+    let [nx, _, nz] = divisions.to_array().map(|n| n as usize);
+    let [x, plane, z] = coordinate.to_array().map(|n| n as usize);
+    let (column, row) = (x * side + o % side, (plane * nz + z) * side + o / side);
+    row * nx * side + column
+}
+
 /// The numbers of a probe's square, channel by channel within each texel.
 fn numbers(ddgi: &Ddgi, kind: &Kind, i: u32) -> Vec<[f32; 4]> {
     let volume = &ddgi.volume;
@@ -229,7 +237,7 @@ fn numbers(ddgi: &Ddgi, kind: &Kind, i: u32) -> Vec<[f32; 4]> {
 pub fn files(ddgi: &Ddgi, notes: &Notes) -> (VolumeRecord, Vec<File>) {
     let (volume, settings) = (&ddgi.volume, &ddgi.settings);
     let grid = &volume.grid;
-    let block = Block { first: grid.origin(), spacing: grid.spacing(), divisions: grid.divisions(), start: 0 };
+    let block = Block::of(grid);
     let mut record = volume_record(grid, &block, 0, notes);
     let centre = [0, 1, 2].map(|i| 0.5 * (record.min[i] + record.max[i]));
     let spacing = settings.spacing(grid);
@@ -250,14 +258,18 @@ pub fn files(ddgi: &Ddgi, notes: &Notes) -> (VolumeRecord, Vec<File>) {
     let mut files = Vec::new();
     for kind in &KINDS {
         let channels = kind.texels.channels();
-        let (texels, width, height) = atlas(&block, kind.side, |i| numbers(ddgi, kind, i));
-        // Of planes beside each other, one behind the other.
-        let (planes, plane) = (block.divisions.y as usize, width as usize / block.divisions.y as usize);
-        let line = |y: usize, p: usize| &texels[y * width as usize + p * plane..][..plane];
-        let layered = (0..planes).flat_map(|p| (0..height as usize).flat_map(move |y| line(y, p)));
-        let layered: Vec<f32> = layered.flat_map(|texel| texel[..channels].to_vec()).collect();
-        let bytes = dds::write(plane as u32, height, planes as u32, kind.texels, &layered);
+        let UVec3 { x, y, z } = block.divisions;
+        let mut layered = vec![0.0; block.count() * kind.side * kind.side * channels];
+        for i in 0..block.count() as u32 {
+            for (o, texel) in numbers(ddgi, kind, i).iter().enumerate() {
+                let at = place(block.divisions, kind.side, block.coordinate(i), o) * channels;
+                layered[at..at + channels].copy_from_slice(&texel[..channels]);
+            }
+        }
+        let (width, height) = (x * kind.side as u32, z * kind.side as u32);
+        let bytes = dds::write(width, height, y, kind.texels, &layered);
         files.push(File { name: format!("{}.{}.dds", record.file, kind.name), bytes });
+        let (texels, width, height) = atlas(&block, kind.side, |i| numbers(ddgi, kind, i));
         let names = ["R", "G", "B", "A"];
         let channel = |c: usize| (names[c], texels.iter().map(|texel| texel[c]).collect::<Vec<f32>>());
         // A picture beside it for people: where it cannot be encoded, there is none.
@@ -282,6 +294,7 @@ pub fn read<'f>(
         return Err(format!("{}: its resolution is not that of 'grid'", own.file));
     }
     let [nx, planes, nz] = own.resolution;
+    let divisions = grid.divisions();
     let count = own.count()?;
     let mut found = Vec::new();
     for kind in &KINDS {
@@ -300,12 +313,7 @@ pub fn read<'f>(
         let at = grid.coordinate(ProbeIndex(i));
         let square = |k: usize| -> Vec<&[f32]> {
             let (side, channels) = (KINDS[k].side, KINDS[k].texels.channels());
-            let width = nx as usize * side;
-            let texel = |o: usize| {
-                let (column, row) = (at.x as usize * side + o % side, at.z as usize * side + o / side);
-                let number = (at.y as usize * nz as usize * side + row) * width + column;
-                &found[k][number * channels..][..channels]
-            };
+            let texel = |o: usize| &found[k][place(divisions, side, at, o) * channels..][..channels];
             (0..side * side).map(texel).collect()
         };
         let irradiance = square(0);

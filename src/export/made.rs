@@ -25,7 +25,7 @@ pub fn form(rules: Rules) -> Form {
 /// scene is known, rays tell which neighbours.
 pub fn one_block(volume: &Volume, query: &QuerySettings, rules: Rules, world: Option<&World>) -> (Grids, Vec<Notes>) {
     let uniform = volume.grid.uniform();
-    let block = Block { first: uniform.origin(), spacing: uniform.spacing(), divisions: uniform.divisions(), start: 0 };
+    let block = Block::of(&uniform);
     let reader = Reader::new(Query { volume, settings: query }, form(rules));
     let found: Vec<_> = (0..block.count() as u32).map(|i| reader.at(block.coordinate(i))).collect();
     let known = found.iter().map(|found| found.map(|(probe, _)| reader.of_probe(probe))).collect();

@@ -9,6 +9,7 @@
 //! The first and the last slice of each sub-volume repeat their neighbour, so that filtering does not mix sub-volumes. The
 //! shader makes E = Σ A·c·Y of it, A being π, 2π/3 and π/4 by band, and divides by π in its Lambertian materials.
 
+use glam::{UVec3, Vec3A};
 use half::f16;
 use serde_json::json;
 
@@ -21,7 +22,7 @@ use crate::math::harmonics::{COSINE, COUNT, Y0};
 const TEXELS: usize = 7;
 
 /// Slices that repeat their neighbour, of each sub-volume.
-const PADDING: usize = 2;
+const PADDING: u32 = 2;
 
 /// Numbers of a texel.
 const WIDTH: usize = 4;
@@ -34,28 +35,40 @@ pub const NOTE: &str = "Spherical harmonics of radiance, linear Rec. 709, W·m�
     lights surfaces with all light that bounced, and with that of emissive surfaces and of the sky: add punctual lights with \
     shadows, and no ambient light, environment or light map. Lambertian materials divide by π themselves.";
 
-/// The numbers of a probe, in order.
-fn numbers(grids: &Grids, probe: usize) -> [f32; TEXELS * WIDTH] {
-    let mut out = [0.0; TEXELS * WIDTH];
-    for (j, value) in grids.of_probe(probe).iter().enumerate() {
-        let radiance = *value / (Y0 * COSINE[j]);
-        out[3 * j..3 * j + 3].copy_from_slice(&radiance.to_array());
-    }
-    out
+/// Where number `n` of a probe lies among those of the texture.
+fn place(block: &Block, coordinate: UVec3, n: usize) -> usize {
+    let UVec3 { x, y, z } = block.divisions;
+    let slice = (n / WIDTH) as u32 * (z + PADDING) + 1 + coordinate.z;
+    (coordinate.x + x * (coordinate.y + y * slice)) as usize * WIDTH + n % WIDTH
+}
+
+/// Texels along each axis.
+fn size(block: &Block) -> UVec3 {
+    let UVec3 { x, y, z } = block.divisions;
+    UVec3::new(x, y, TEXELS as u32 * (z + PADDING))
+}
+
+/// Numbers of the texture.
+fn count(block: &Block) -> usize {
+    size(block).to_array().iter().map(|&n| n as usize).product::<usize>() * WIDTH
 }
 
 /// The texture of a block.
 pub fn pack(grids: &Grids, block: &Block) -> Vec<f32> {
-    let layer = (block.divisions.x * block.divisions.y) as usize;
-    let slices = block.divisions.z as usize;
-    let of_probe: Vec<_> = (0..block.count()).map(|i| numbers(grids, block.start as usize + i)).collect();
-    let mut out = Vec::with_capacity(TEXELS * (slices + PADDING) * layer * WIDTH);
-    for t in 0..TEXELS {
-        for slice in 0..slices + PADDING {
-            let z = slice.clamp(1, slices) - 1;
-            let own = &of_probe[z * layer..][..layer];
-            own.iter().for_each(|numbers| out.extend(&numbers[WIDTH * t..][..WIDTH]));
+    let mut out = vec![0.0; count(block)];
+    for i in 0..block.count() {
+        for (j, value) in grids.of_probe(block.start as usize + i).iter().enumerate() {
+            let radiance = *value / (Y0 * COSINE[j]);
+            for (channel, number) in radiance.to_array().into_iter().enumerate() {
+                out[place(block, block.coordinate(i as u32), 3 * j + channel)] = number;
+            }
         }
+    }
+    let slice = WIDTH * (block.divisions.x * block.divisions.y) as usize;
+    for sub_volume in out.chunks_exact_mut(slice * (block.divisions.z + PADDING) as usize) {
+        sub_volume.copy_within(slice..2 * slice, 0);
+        let last = sub_volume.len() - slice;
+        sub_volume.copy_within(last - slice..last, last);
     }
     out
 }
@@ -76,9 +89,7 @@ pub fn files(grids: &Grids, block: &Block, record: &mut VolumeRecord) -> Vec<Fil
     let (number, bytes) = encode(&pack(grids, block));
     record.number = number;
     record.file.push_str(".bin");
-    record.engine = json!({ "textureSize": [
-        block.divisions.x, block.divisions.y, TEXELS as u32 * (block.divisions.z + PADDING as u32),
-    ] });
+    record.engine = json!({ "textureSize": size(block).to_array() });
     vec![File { name: record.file.clone(), bytes }]
 }
 
@@ -93,9 +104,7 @@ pub fn companions() -> Vec<File> {
 /// # Errors
 /// The file is not of this volume.
 pub fn read(grids: &mut Grids, block: &Block, record: &VolumeRecord, bytes: &[u8]) -> Result<(), String> {
-    let layer = (block.divisions.x * block.divisions.y) as usize;
-    let slices = block.divisions.z as usize;
-    let count = TEXELS * (slices + PADDING) * layer * WIDTH;
+    let count = count(block);
     let size = match record.number {
         Number::Half => 2,
         Number::Float => 4,
@@ -109,14 +118,10 @@ pub fn read(grids: &mut Grids, block: &Block, record: &VolumeRecord, bytes: &[u8
         _ => f32::from_le_bytes([bytes[4 * i], bytes[4 * i + 1], bytes[4 * i + 2], bytes[4 * i + 3]]),
     };
     for i in 0..block.count() {
-        let (z, in_layer) = (i / layer, i % layer);
-        let of = |n: usize| {
-            let slice = n / WIDTH * (slices + PADDING) + 1 + z;
-            number((slice * layer + in_layer) * WIDTH + n % WIDTH)
-        };
-        let mut values = [glam::Vec3A::ZERO; COUNT];
+        let of = |n: usize| number(place(block, block.coordinate(i as u32), n));
+        let mut values = [Vec3A::ZERO; COUNT];
         for (j, value) in values.iter_mut().enumerate() {
-            *value = glam::Vec3A::new(of(3 * j), of(3 * j + 1), of(3 * j + 2)) * (Y0 * COSINE[j]);
+            *value = Vec3A::new(of(3 * j), of(3 * j + 1), of(3 * j + 2)) * (Y0 * COSINE[j]);
         }
         if values.iter().any(|value| !value.is_finite()) {
             return Err(format!("{} holds numbers that are not finite", record.file));

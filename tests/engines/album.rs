@@ -44,7 +44,9 @@ pub fn entries(engine: &str) -> Vec<Entry> {
 impl Entry {
     /// Prints how far an engine's picture is off, and keeps both side by side.
     pub fn judge(&self, found: &[Vec3]) {
-        let unit = self.expected.iter().map(|e| e.element_sum() / 3.0).sum::<f32>() / self.expected.len() as f32;
+        let mean = self.expected.iter().map(|e| e.element_sum() / 3.0).sum::<f32>() / self.expected.len() as f32;
+        // Two black pictures do not differ.
+        let unit = mean.max(f32::MIN_POSITIVE);
         let Differences { median, most_of_97, most } = Differences::of(found, &self.expected, unit);
         eprintln!("album, {}: median {median:.5}, 97 % {most_of_97:.5}, most {most:.5}", self.name);
         keep(&self.name, self.size, found, &self.expected, unit);

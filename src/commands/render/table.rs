@@ -2,7 +2,7 @@
 
 use crate::evaluate::PATH_RAY;
 use crate::report::baked::BakedReport;
-use crate::report::error::{ErrorEstimate, ErrorReport};
+use crate::report::error::{ErrorEstimate, ErrorReport, TOO_NOISY};
 use crate::report::render::{MethodReport, RenderReport, Timing};
 use crate::report::table::{Column, Table};
 use crate::shade::visibility_modes::VisibilityMode;
@@ -39,6 +39,7 @@ const OF_REFERENCE: &[Row] = &[
     ("error (nrmse)", |m| errors_of(m).map_or(format::UNDEFINED.to_owned(), |e| relative_rmse(&e.all))),
     ("error in corners", |m| errors_of(m).map_or(format::UNDEFINED.to_owned(), |e| relative_rmse(&e.by_region.corner))),
     ("error elsewhere", |m| errors_of(m).map_or(format::UNDEFINED.to_owned(), |e| relative_rmse(&e.by_region.flat))),
+    ("falsely black", |m| percent(m.leak.black)),
     ("in the air: error", |m| {
         let error = m.air.standard_error.error.map(|e| 100.0 * e);
         format::or_undefined(m.air.error, |share| format!("{} %", format::with_error(100.0 * share, error)))
@@ -218,5 +219,8 @@ fn verdicts(errors: &[(&str, &ErrorReport)]) -> Vec<String> {
             }
         }
     }
-    found.into_iter().map(|(verdict, about)| format!("  {verdict} ({})", about.join(", "))).collect()
+    let remedy = |verdict: &str| {
+        if verdict == TOO_NOISY { ": its noise exceeds the difference; give it more samples" } else { "" }
+    };
+    found.into_iter().map(|(verdict, about)| format!("{verdict} ({}){}", about.join(", "), remedy(verdict))).collect()
 }

@@ -1,10 +1,13 @@
 //! A sweep's report for people.
 
 use crate::report::sweep::{
-    Aggregate, AxisValue, CheapestAt, ConfigurationReport, EqualReport, FloorReport, SweepReport,
+    Aggregate, AxisValue, CheapestAt, ConfigurationReport, EqualReport, FloorCause, FloorReport, SweepReport,
 };
 use crate::report::table::{Column, Table};
 use crate::system::format;
+
+/// Shares of an error that are smaller are of no account, whatever their sign.
+const HIDES: f64 = 0.01;
 
 /// All tables.
 pub fn text(report: &SweepReport) -> String {
@@ -38,6 +41,15 @@ pub fn text(report: &SweepReport) -> String {
 
 fn percent(value: Option<f64>) -> String {
     format::or_undefined(value, format::percent)
+}
+
+/// The share of the squared error that goes with a cause. Below zero the error grows without it: it hid another.
+fn share_of(cause: &FloorCause) -> String {
+    match cause.share {
+        Some(share) if share < -HIDES => "hides another".to_owned(),
+        Some(share) if share < 0.0 => format::percent(0.0),
+        share => percent(share),
+    }
 }
 
 /// Whether every ladder is one point: methods side by side.
@@ -187,7 +199,7 @@ fn floors(floors: &[FloorReport]) -> String {
                 String::new(),
                 cause.cause.replace('_', " "),
                 percent(cause.error_relative),
-                percent(cause.share),
+                share_of(cause),
                 cause.how.clone(),
             ]);
         }

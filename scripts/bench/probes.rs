@@ -107,6 +107,7 @@ fn filter_and_bounce(criterion: &mut Criterion) {
         voxels: None,
         keeps_geometric: false,
         sees: false,
+        shows: false,
         resampling: None,
         guide: None,
         counts: None,

@@ -1,9 +1,11 @@
 """Tables that judge the default: against all others at twice its bytes and on equal positions, on shifted grids, and without
 each of its ingredients."""
-from methods_plan import sweep_of, typical
+from methods_plan import figure, sweep_of, typical
 from methods_tables import geometric_mean, markdown, percent, significant, size
 
 OURS = ("default", "physical")
+# The default's row that shades gloss.
+GLOSSY = "default, with gloss"
 
 
 def split(report):
@@ -14,14 +16,14 @@ def split(report):
 
 
 def least(rows, key):
-    rows = [row for row in rows if typical(row, key) is not None]
+    rows = [row for row in rows if figure(row, key) is not None]
     return min(rows, key=lambda row: typical(row, key)) if rows else None
 
 
 def ratio(own, other, key):
     if other is None:
         return None
-    a, b = typical(own, key), typical(other, key)
+    a, b = figure(own, key), figure(other, key)
     return a / b if a is not None and b else None
 
 
@@ -42,7 +44,7 @@ JUDGED = [
 def judged_table(scenes):
     """What the default errs, and that as a share of what the best published method does: each figure's best."""
     lines, columns = [], [[] for _ in JUDGED]
-    leaks = []
+    leaks, gloss = [], []
     for scene in scenes:
         reports = {part: sweep_of(scene, part) for part in ("bytes", "positions")}
         if None in reports.values():
@@ -60,13 +62,16 @@ def judged_table(scenes):
         ddgi = next((row for row in published if row["label"].split(",")[0] == "ddgi-2019"), None)
         leaks.append(ratio(own, ddgi, "leak_light"))
         cells.append(times(leaks[-1]))
+        with_gloss = next((row for row in reports["positions"]["configurations"] if row["label"] == GLOSSY), own)
+        gloss.append(ratio(with_gloss, least(published, "relmse_gltf"), "relmse_gltf"))
+        cells.append(times(gloss[-1]))
         lines.append(cells)
     if not lines:
         return "Nothing was run."
-    means = [times(geometric_mean(column)) for column in [*columns, leaks]]
+    means = [times(geometric_mean(column)) for column in [*columns, leaks, gloss]]
     lines.append(["geometric mean", "", "", "", "", "", *means])
     head = ["scene", "bytes", "error", "best published at twice the bytes", "bytes", "error"]
-    head += [f"{name} ÷ best" for name, *_ in JUDGED] + ["leak light ÷ `ddgi-2019`'s"]
+    head += [f"{name} ÷ best" for name, *_ in JUDGED] + ["leak light ÷ `ddgi-2019`'s", "relmse of gloss, equal positions ÷ best"]
     return markdown(head, lines)
 
 

@@ -12,9 +12,10 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 WORK = ROOT / "out" / "methods"
 SHARED = os.environ.get("SHARED", "../shared")
 
-PRESETS = ["physical", "default", "irradiance-2022", "lightfield-2022", "ddgi-2019", "threev8-uniform", "threev8-mixed"]
+PRESETS = ["physical", "default", "irradiance-2022", "lightfield-2022", "mcguire-2017", "ddgi-2019"]
+PRESETS += ["threev8-uniform", "threev8-mixed"]
 # More than 8 KiB a probe: ladders end at the scene's own spacing, beyond which a bake takes hours of a core.
-LARGE = {"irradiance-2022", "lightfield-2022"}
+LARGE = {"irradiance-2022", "lightfield-2022", "mcguire-2017"}
 
 # Spacings, m: the scene's own first; those of its curves from coarse to fine.
 SCENES = {
@@ -25,7 +26,7 @@ SCENES = {
     "cornell": {"spacing": 0.25, "curve": [1.0, 0.7, 0.5, 0.35, 0.25, 0.18]},
     "courtyard": {"spacing": 2.0, "curve": [8.0, 5.6, 4.0, 2.8, 2.0, 1.4]},
     "office": {"spacing": 1.0, "mixed": 0.35},
-    "glossy_room": {"spacing": 0.75},
+    "glossy_room": {"spacing": 0.75, "glossy": True},
     "veach_ajar": {"file": f"{SHARED}/scenes/veach_ajar/veach_ajar.glb", "spacing": 0.7},
     "bathroom": {
         "file": f"{SHARED}/scenes/bathroom/LAZIENKA.gltf",
@@ -33,6 +34,7 @@ SCENES = {
         "words": ["--env", "1,1,1"],
         "curve": [1.4, 1.0, 0.7, 0.5, 0.35, 0.25],
         "mixed": 0.25,
+        "glossy": True,
     },
 }
 
@@ -40,11 +42,31 @@ SCENES = {
 # (scene, part, preset): settings. Rows made with them are called scaled.
 SCALED = {}
 
+# The same in every scene and part: 8 MiB a probe are 2 to 18 GB on these grids. Maps of 128² are as large as those of the others.
+MARCH = ["capture.rays.octahedral.resolution=128", "store.light_field=march(lowest: 8)"]
+MARCH += ["store.irradiance.octahedral.resolution=32", "store.occlusion.moments.resolution=32"]
+ALWAYS_SCALED = {"mcguire-2017": MARCH}
+
+# What makes our methods shade gloss, in scenes that have it: levels of 32² to 2² texels, which take finer captures.
+GLOSS = [
+    "capture.rays=octahedral(resolution: 32, per_texel: 1, guided: 0)",
+    "store.prefiltered=[32,16,8,4,2]",
+    "store.prefilter=ggx",
+    "query.glossy=prefiltered(parallax: volume)",
+]
+
 # What methods of more than 8 KiB a probe are scaled to where bytes are compared: texels along a side of all their maps.
 MAPS = (16, 32, 64)
 
 
 def scaled_maps(preset, texels):
+    if preset == "mcguire-2017":
+        return [
+            f"capture.rays.octahedral.resolution={texels}",
+            f"store.light_field=march(lowest: {texels // 8})",
+            f"store.irradiance.octahedral.resolution={texels}",
+            f"store.occlusion.moments.resolution={texels}",
+        ]
     of_preset = {
         "irradiance-2022": ["store.prefiltered=[]"],
         "lightfield-2022": [f"store.occlusion.moments.resolution={texels}", "store.layout.published=None"],
@@ -107,11 +129,17 @@ def typical(configuration, key):
     return figure["mean"] if figure["geometric_mean"] is None else figure["geometric_mean"]
 
 
+def figure(configuration, key):
+    """The same; `None` where a sweep has no such figure, as those of before it was measured."""
+    return typical(configuration, key) if key in configuration["figures"] else None
+
+
 # Ladders
 
 
 def ladder(scene, part, name, preset, settings, axes=""):
-    scaled = SCALED.get((scene, part, preset), [])
+    always = [] if "scaled" in name else ALWAYS_SCALED.get(preset, [])
+    scaled = [*always, *SCALED.get((scene, part, preset), [])]
     quoted = ", ".join(json.dumps(text) for text in [*settings, *scaled])
     config = config_of(scene)
     config = f'config: "{os.path.relpath(config, WORK / scene / part)}", ' if config else ""
@@ -124,7 +152,11 @@ def at_spacing(spacing):
 
 
 def positions(scene):
-    return [ladder(scene, "positions", preset, preset, at_spacing(spacing_of(scene))) for preset in PRESETS]
+    own = at_spacing(spacing_of(scene))
+    entries = [ladder(scene, "positions", preset, preset, own) for preset in PRESETS]
+    if SCENES[scene].get("glossy"):
+        entries += [ladder(scene, "positions", f"{name}, with gloss", name, [*own, *GLOSS]) for name in PRESETS[:2]]
+    return entries
 
 
 def curves(scene):

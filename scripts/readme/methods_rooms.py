@@ -11,7 +11,7 @@ ROOMS_ROWS = ["physical", "physical.walls", *PRESETS[1:]]
 VISIBILITY = {"irradiance-2022": "none", "lightfield-2022": "Chebyshev³", "physical": "table at surfaces"}
 VISIBILITY["physical.walls"] = "table at surfaces, grid to the walls"
 VISIBILITY["default"] = VISIBILITY["physical"]
-VISIBILITY |= {"ddgi-2019": "Chebyshev³", "threev8-uniform": "Chebyshev", "threev8-mixed": "Chebyshev"}
+VISIBILITY |= {"mcguire-2017": "Chebyshev", "ddgi-2019": "Chebyshev³", "threev8-uniform": "Chebyshev", "threev8-mixed": "Chebyshev"}
 
 
 def room(scene, preset, camera):

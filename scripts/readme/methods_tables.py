@@ -2,7 +2,8 @@
 import math
 import os
 
-from methods_plan import PRESETS, SCENES, WORK, sweep_of, typical
+from methods_plan import PRESETS, SCENES, WORK, figure, sweep_of, typical
+
 
 def significant(value, digits=3):
     """With so many digits, and no more zeros than the number has."""
@@ -53,6 +54,21 @@ FIGURES = [
 ]
 
 
+# Where a scene has glossy surfaces and a row shades them.
+GLOSSY = [
+    ("gloss: error", "error_gltf", percent),
+    ("gloss: relmse", "relmse_gltf", lambda value: "–" if value is None else significant(value)),
+    ("gloss: shade", "glossy_shade_ms", milliseconds),
+    ("gloss: bytes a probe", "glossy_bytes_per_probe", lambda value: "–" if value is None else f"{value:,.0f}"),
+]
+
+
+def figures_of(report):
+    """The columns of a sweep."""
+    has_gloss = any(figure(row, "glossy_shade_ms") is not None for row in report["configurations"])
+    return FIGURES + GLOSSY if has_gloss else FIGURES
+
+
 def markdown(head, rows):
     lines = ["| " + " | ".join(head) + " |", "|---|" + "--:|" * (len(head) - 1)]
     return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
@@ -70,20 +86,21 @@ def caption(scene, report):
 
 def best(rows, key):
     """The least of a figure, where several have it."""
-    values = [value for value in (typical(row, key) for row in rows) if value is not None]
+    values = [value for value in (figure(row, key) for row in rows) if value is not None]
     return min(values) if len(values) > 1 else None
 
 
 def full_table(report, held):
     rows = report["configurations"]
-    least = {key: best(rows, key) for _, key, _ in FIGURES if key.startswith(("error", "air"))}
-    head = ["method", "probes", *(name for name, _, _ in FIGURES)]
+    figures = figures_of(report)
+    least = {key: best(rows, key) for _, key, _ in figures if key.startswith(("error", "air", "relmse"))}
+    head = ["method", "probes", *(name for name, _, _ in figures)]
     own = next((typical(row, "bytes") for row in rows if row["label"] == "default"), None)
     lines = []
     for row in rows:
         cells = [f"`{row['label']}`", f"{row['probes']:,}"]
-        for _, key, form in FIGURES:
-            value = typical(row, key)
+        for _, key, form in figures:
+            value = figure(row, key)
             text = form(value)
             cells.append(f"**{text}**" if value is not None and value == least.get(key) else text)
         if held == "bytes":

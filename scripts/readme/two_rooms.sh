@@ -26,7 +26,7 @@ walls='(min: (-4.05, 0, -2), max: (4.05, 3, 2))'
 declare -A view=([lit]='--camera lit' [dark]='--camera dark' [outside]='--look-at=-8,6,9,0,1,0,45')
 
 for scene in two_rooms_sealed two_rooms_open; do
-    for row in physical physical.walls irradiance-2022 lightfield-2022 ddgi-2019 threev8-uniform threev8-mixed; do
+    for row in physical physical.walls irradiance-2022 lightfield-2022 mcguire-2017 ddgi-2019 threev8-uniform threev8-mixed; do
         folder=$work/$scene.$row
         bounds=$inside
         [[ $row != *.walls ]] || bounds=$walls

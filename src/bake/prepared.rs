@@ -94,6 +94,7 @@ impl Prepared<'_, '_> {
             hit_light: self.config.transport.hit_light(),
             keeps_geometric: self.config.query.needs_geometric(),
             sees: self.config.store.light_field != LightFieldStore::None,
+            shows: !self.radiance_store().is_empty(),
             resampling: self.resampling.as_ref(),
             guide: None,
             counts: None,

@@ -14,15 +14,16 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::probe::lattice::grid::MAX_PROBES;
-
 pub use self::convert::{ConvertArgs, LatticeName};
 pub use self::export::{EngineName, ExportArgs, TargetName, VolumesName};
 pub use self::inspect::{HelpArgs, InspectArgs};
 pub use self::look::LookArgs;
 pub use self::trace::TraceArgs;
 pub use self::values::{LookAt, PictureSize, TraceRay};
-use self::values::{parse_exposure, parse_index, parse_positive, parse_seconds, parse_size, parse_target_error};
+use self::values::{
+    parse_exposure, parse_index, parse_most_probes, parse_positive, parse_samples, parse_seconds, parse_seeds,
+    parse_size, parse_target_error,
+};
 
 /// Bakes light-field probe volumes for global illumination and measures how much they leak, err and cost.
 #[derive(Debug, Parser)]
@@ -161,7 +162,7 @@ pub struct BakeArgs {
     #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = parse_target_error)]
     pub target_error: Option<f64>,
     /// Most probes of a grid that --target-error may choose, times its samples ÷ those of the configuration.
-    #[arg(long, value_name = "N", default_value_t = 65_536, allow_negative_numbers = true, requires = "target_error", value_parser = clap::value_parser!(u64).range(1..=MAX_PROBES))]
+    #[arg(long, value_name = "N", default_value_t = 65_536, allow_negative_numbers = true, requires = "target_error", value_parser = parse_most_probes)]
     pub max_probes: u64,
     /// Also write the report to this file.
     #[arg(long, value_name = "FILE.json")]
@@ -179,12 +180,12 @@ pub struct BakeArgs {
     ///
     /// Captured surfaces that do not fit are kept in OUT.probes.resume, and what else is needed is taken in any case: the
     /// result is the same. --dry-run says how much that is.
-    #[arg(long, value_name = "SIZE", value_parser = parse_size, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SIZE", value_parser = parse_size, allow_hyphen_values = true)]
     pub memory_budget: Option<u64>,
     /// Continue an interrupted bake of the same scene, configuration and seed from OUT.probes.resume: the result is that of
     /// one run.
     ///
-    /// Captured probes and iterations are not computed again; placement, and a fit, are.
+    /// Captured probes, iterations and the paths of a fit are not computed again; placement and the survey are.
     #[arg(long)]
     pub resume: bool,
     /// Save the work to OUT.probes.resume once the bake takes longer than this, and iterations as often: seconds, 0 for at
@@ -213,13 +214,14 @@ pub struct RenderArgs {
     pub view: ViewArgs,
     /// Exposure of the PNG pictures, in powers of two; from the picture where not given.
     ///
-    /// Then it brings the log-average of the reference to 18 % grey, without one that of the picture with exact visibility.
+    /// Then it brings the log-average of the surfaces in the reference to 18 % grey, without one that of the picture with
+    /// exact visibility. A sky behind them does not count.
     #[arg(long, value_name = "EV", allow_hyphen_values = true, value_parser = parse_exposure)]
     pub exposure: Option<f32>,
     /// Path-trace a reference of every camera with SPP samples per pixel, and report how far the probes are from it.
     ///
     /// Rounded up to a multiple of 16; from 32 on figures have standard errors.
-    #[arg(long, value_name = "SPP", allow_negative_numbers = true, conflicts_with = "reference_image", value_parser = clap::value_parser!(u32).range(1..=MAX_SPP))]
+    #[arg(long, value_name = "SPP", allow_negative_numbers = true, conflicts_with = "reference_image", value_parser = parse_samples)]
     pub reference: Option<u32>,
     /// The same with a reference that is there: of this camera and size, as `reference` or --reference wrote it.
     ///
@@ -249,7 +251,7 @@ pub struct ReferenceArgs {
     pub output: PathBuf,
     /// Samples per pixel in all, those of a resumed file included. Rounded up to a multiple of 16; 1 to 15 are taken as
     /// they are, for a quick look without a known error.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=MAX_SPP))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_samples)]
     pub spp: u32,
     /// Reflection: `lambert` as in probes, every surface diffuse; `gltf` as glTF 2.0 defines metallic-roughness materials
     /// (appendix B: GGX with Smith's shadowing over a diffuse base), with a layer `glossy` too. Only where the appendix
@@ -277,9 +279,6 @@ pub struct ReferenceArgs {
     #[command(flatten)]
     pub config: ConfigArgs,
 }
-
-/// Most samples per pixel: their sum is far from losing a sample to f64, and years from being reached.
-const MAX_SPP: i64 = 1 << 30;
 
 /// Models of reflection by the names of the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -315,21 +314,18 @@ pub struct SweepArgs {
     #[arg(long, value_enum)]
     pub equal: Option<EqualName>,
     /// Samples per pixel of the reference, rounded up to a multiple of 16. More are added to one that is there.
-    #[arg(long, value_name = "SPP", default_value_t = 256, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=MAX_SPP))]
+    #[arg(long, value_name = "SPP", default_value_t = 256, allow_negative_numbers = true, value_parser = parse_samples)]
     pub reference: u32,
     /// Bakes of every configuration, with the seeds from --seed on. From 2 on, noise is told from bias.
-    #[arg(long, value_name = "N", default_value_t = 3, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=MAX_SEEDS))]
+    #[arg(long, value_name = "N", default_value_t = 3, allow_negative_numbers = true, value_parser = parse_seeds)]
     pub seeds: u32,
     /// Bake every configuration on N grids, shifted by fractions of a cell that --seed chooses, and report geometric means:
     /// how planes of probes meet walls decides much of the error.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=MAX_SEEDS))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_seeds)]
     pub offsets: Option<u32>,
     #[command(flatten)]
     pub view: ViewArgs,
 }
-
-/// Most seeds of a sweep, and most offsets: the spread is known well long before.
-const MAX_SEEDS: i64 = 1000;
 
 /// What is held equal between methods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]

@@ -3,6 +3,8 @@
 use std::str::FromStr;
 use std::time::Duration;
 
+use crate::probe::lattice::grid::MAX_PROBES;
+
 /// Width and height, pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PictureSize {
@@ -101,6 +103,30 @@ pub fn parse_index(text: &str) -> Result<u32, String> {
     text.parse().map_err(|_| format!("write a whole number from 0 to {}, such as 8", u32::MAX))
 }
 
+/// A whole number from 1 to `most`.
+fn parse_number(text: &str, most: u64, example: &str) -> Result<u64, String> {
+    let number: Option<u64> = text.parse().ok().filter(|n| (1..=most).contains(n));
+    number.ok_or_else(|| format!("write a whole number from 1 to {most}, such as {example}"))
+}
+
+/// Most samples per pixel: their sum is far from losing a sample to f64, and years from being reached.
+const MAX_SPP: u32 = 1 << 30;
+
+/// Most seeds of a sweep, and most offsets: the spread is known well long before.
+const MAX_SEEDS: u32 = 1000;
+
+pub fn parse_samples(text: &str) -> Result<u32, String> {
+    Ok(parse_number(text, MAX_SPP.into(), "64")? as u32)
+}
+
+pub fn parse_seeds(text: &str) -> Result<u32, String> {
+    Ok(parse_number(text, MAX_SEEDS.into(), "3")? as u32)
+}
+
+pub fn parse_most_probes(text: &str) -> Result<u64, String> {
+    parse_number(text, MAX_PROBES, "65536")
+}
+
 pub fn parse_seed(text: &str) -> Result<u64, String> {
     text.parse().map_err(|_| format!("write a whole number from 0 to {}, such as 1", u64::MAX))
 }
@@ -138,6 +164,15 @@ pub fn parse_seconds(text: &str) -> Result<Duration, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn whole_numbers_are_asked_for_in_plain_words() {
+        assert_eq!((parse_samples("1"), parse_seeds("1000"), parse_most_probes("8")), (Ok(1), Ok(1000), Ok(8)));
+        for message in [parse_samples("0"), parse_samples("-4"), parse_seeds("1001"), parse_seeds("two")] {
+            assert!(message.unwrap_err().starts_with("write a whole number from 1 to "));
+        }
+        assert!(parse_most_probes("0").unwrap_err().ends_with("such as 65536"));
+    }
 
     #[test]
     fn sizes_need_a_unit() {

@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, anyhow};
 
 use super::session::{Opening, Session, list_presets, lists_presets, resolve_config};
-use super::{Console, grid_advice, target, tell, write_json};
+use super::{Console, grid_advice, kinds, target, tell, write_json};
 use crate::bake::{Baked, Checkpoint, Circumstances, Foretold, foretell, prepare, saving};
 use crate::cli::BakeArgs;
 use crate::config::Config;
@@ -26,6 +26,9 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
     let config = resolve_config(&args.config, &args.trace)?;
     if args.print_config {
         return console.print(&config.to_ron());
+    }
+    if let Some(scene) = &args.scene {
+        kinds::expect_scene(scene, "bake SCENE -o OUT.probes")?;
     }
     target::check(args, &config)?;
     tell::configuration(console, &args.config);
@@ -69,9 +72,11 @@ pub fn run(args: &BakeArgs, console: &Console) -> Result<()> {
 fn write(baked: &Baked, output: &Path) -> Result<u64> {
     let saved = saving::path_for(output);
     match baked.container.write(output) {
-        Err(error) if journal::is_journal(&saved) => {
-            Err(anyhow!("{error}; {} keeps the work, --resume goes on from it", saved.display()))
+        Err(error) if journal::holds_records(&saved) => {
+            let kept = if baked.unsaved.is_some() { "a part of the work" } else { "the work" };
+            Err(anyhow!("{error}; {} keeps {kept}, --resume goes on from it", saved.display()))
         }
+        // A journal without any work is removed too.
         written => {
             journal::remove(&saved);
             Ok(written?)
@@ -247,7 +252,11 @@ fn warn_about(report: &BakeReport, config: &Config, console: &Console) {
     }
     if numerics.hits_outside_volume > 0 {
         let hits = format::counted(numerics.hits_outside_volume, "captured hit lies", "captured hits lie");
-        console.warn(format!("{hits} outside the probes' hull, where the nearest cell is used; enlarge grid.bounds"));
+        let remedy = match config.grid.bounds {
+            Some(_) => "enlarge grid.bounds",
+            None => "give every axis two probes or more",
+        };
+        console.warn(format!("{hits} outside the probes' hull, where the nearest cell is used; {remedy}"));
     }
     if numerics.non_finite > 0 {
         let values =

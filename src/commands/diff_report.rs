@@ -10,7 +10,7 @@ use crate::cli::DiffArgs;
 use crate::report::diff::mask::Mask;
 use crate::report::diff::shown;
 use crate::report::diff::thresholds::Thresholds;
-use crate::report::diff::{Compared, DiffReport, Request, compare, junit, markdown};
+use crate::report::diff::{Compared, DiffReport, Request, SCHEMA, compare, junit, markdown};
 use crate::report::gate::Gate;
 use crate::report::header::command_line;
 use crate::report::table::{Column, Table};
@@ -23,6 +23,9 @@ const JSON: &str = "diff.json";
 const MARKDOWN: &str = "diff.md";
 const JUNIT: &str = "junit.xml";
 const PAGE: &str = "index.html";
+
+/// How the names of difference maps begin.
+const MAP: &str = "difference";
 
 /// Columns from which on a terminal shows all there is of a gate.
 const WIDE: usize = 120;
@@ -95,14 +98,46 @@ fn write(args: &DiffArgs, compared: &mut Compared) -> Result<()> {
     let junit = junit::text(report).context("cannot write the gates as JUnit XML")?;
     let page = shown::page(report, images, plots)?;
     create_folder(&args.output)?;
+    remove_earlier(&args.output)?;
     for (name, picture) in &compared.pictures {
         picture.write_png(&args.output.join(name))?;
     }
+    // The largest first: a verdict is not left alone where the disk gets full.
+    write_atomically(&args.output.join(PAGE), |file| file.write_all(page.as_bytes()))?;
     write_atomically(&args.output.join(MARKDOWN), |file| file.write_all(markdown.as_bytes()))?;
     write_atomically(&args.output.join(JUNIT), |file| file.write_all(junit.as_bytes()))?;
-    write_atomically(&args.output.join(PAGE), |file| file.write_all(page.as_bytes()))?;
     // Last: whoever waits for it finds the others there.
     write_json(&args.output.join(JSON), report)
+}
+
+/// Removes what an earlier comparison left in the folder: its verdict and its maps are of other sides. Folders that no
+/// comparison wrote are left alone.
+fn remove_earlier(folder: &Path) -> Result<()> {
+    let report = folder.join(JSON);
+    let is_ours = std::fs::read_to_string(&report).is_ok_and(|text| {
+        let report: Result<serde_json::Value, _> = serde_json::from_str(&text);
+        report.is_ok_and(|report| report["schema"] == SCHEMA)
+    });
+    if !is_ours {
+        return Ok(());
+    }
+    let names = std::fs::read_dir(folder).with_context(|| format!("cannot read the folder {}", folder.display()))?;
+    let maps = names.filter_map(Result::ok).map(|entry| entry.path()).filter(|path| is_map(path));
+    // The report goes first: without it the folder is no result.
+    for path in [report, folder.join(PAGE), folder.join(MARKDOWN), folder.join(JUNIT)].into_iter().chain(maps) {
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                return Err(error).with_context(|| format!("cannot remove {} of an earlier run", path.display()));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn is_map(path: &Path) -> bool {
+    let rest = path.file_name().and_then(|name| name.to_str()).and_then(|name| name.strip_prefix(MAP));
+    rest.is_some_and(|rest| rest == ".png" || rest.starts_with('_') && rest.ends_with(".png"))
 }
 
 fn print(args: &DiffArgs, console: &Console, report: &DiffReport) -> Result<()> {

@@ -43,6 +43,9 @@ struct Made {
 
 pub fn run(args: &ExportArgs, console: &Console) -> Result<()> {
     kinds::expect_probes(&args.probes, "export PROBES --to ENGINE -o DIR --scene SCENE")?;
+    if let Some(scene) = &args.scene {
+        kinds::expect_scene(scene, "export PROBES --to ENGINE -o DIR --scene SCENE")?;
+    }
     let to = Target::from(args.to);
     check_arguments(args, to)?;
     check_folder(&args.output)?;

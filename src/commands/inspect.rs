@@ -195,7 +195,8 @@ fn to_text(file: &ProbeFile, probe: Option<u32>) -> String {
         volume.states.len(),
         volume.irradiance.describe(),
         volume.occlusion.describe(),
-        serde_json::to_string(&file.query.weights).unwrap_or_default(),
+        // Words apart, so that a terminal can wrap them.
+        serde_json::to_string(&file.query.weights).unwrap_or_default().replace(",\"", ", \""),
     );
     let mut table = Table::new(&[
         ("tensor", Column::Text),
@@ -220,7 +221,7 @@ fn to_text(file: &ProbeFile, probe: Option<u32>) -> String {
         out += &format!("probe {p} at {:?} m, {}\n", position_world(volume, index), state.as_str().unwrap_or_default());
         for (name, e) in axes(volume, index) {
             let channels = e.to_array().map(|channel| format::significant(f64::from(channel), DIGITS)).join(" ");
-            out += &format!("  irradiance {name}  {channels}\n");
+            out += &format!("  irradiance {name}  {channels} W·m⁻²\n");
         }
     }
     if let Some(lines) = file.plan["lines"].as_array() {

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 
 use super::camera::cameras;
 use super::session::{Opening, Session, list_presets, lists_presets, resolve_config};
-use super::{Console, check_picture_memory, tell, write_json};
+use super::{Console, check_picture_memory, kinds, tell, write_json};
 use crate::cli::{ReferenceArgs, TransportName};
 use crate::config::Config;
 use crate::light::World;
@@ -40,6 +40,7 @@ pub fn run(args: &ReferenceArgs, console: &Console) -> Result<()> {
     if args.view.camera.as_deref() == Some("all") {
         bail!("--camera all: a reference is one picture; name one camera");
     }
+    kinds::expect_scene(&args.scene, "reference SCENE -o FILE.exr --spp N")?;
     check_extension(&args.output)?;
     let config = resolve_config(&args.config, &args.trace)?;
     tell::configuration(console, &args.config);
@@ -248,7 +249,7 @@ fn summary(report: &ReferenceReport) -> Table {
         ("samples per pixel", report.spp.to_string()),
         (
             "irradiance, whole picture",
-            format::or_undefined(report.irradiance_indirect_mean, |e| format::significant(e, 4)),
+            format::or_undefined(report.irradiance_indirect_mean, |e| format!("{} W·m⁻²", format::significant(e, 4))),
         ),
         ("standard error", standard_error),
         ("rays", millions(report.rays.primary + report.rays.shadow)),

@@ -6,8 +6,9 @@ use std::time::Instant;
 use anyhow::{Result, bail, ensure};
 use serde::Serialize;
 
-use super::{Console, kinds, tell};
+use super::{Console, tell};
 use crate::cli::{ConfigArgs, TraceArgs};
+use crate::config::presets::Preset;
 use crate::config::{Config, Layers, presets};
 use crate::light::World;
 use crate::plan;
@@ -16,6 +17,7 @@ use crate::report::header::{Header, command_line};
 use crate::scene::light::LIGHT_MAX;
 use crate::scene::{self, Detail, EnvironmentSource, LoadOptions, Scene};
 use crate::system::output::{Named, check_apart, check_outputs};
+use crate::system::terminal;
 
 /// What a session is opened with.
 pub struct Opening<'a> {
@@ -73,7 +75,6 @@ impl<'c> Session<'c> {
     /// An output cannot be written, or is an input; the scene cannot be loaded, or is another than that of the probes.
     pub fn open(opening: Opening, console: &'c Console) -> Result<Session<'c>> {
         let Opening { scene: path, trace, light, .. } = opening;
-        kinds::expect_scene(path, "COMMAND SCENE …")?;
         check_sky_flags(trace, light.sky)?;
         check_outputs(&opening.outputs, &inputs(path, trace, opening.inputs))?;
         let threads = set_threads(trace.threads)?;
@@ -184,8 +185,22 @@ pub fn lists_presets<'n>(names: impl IntoIterator<Item = &'n String>) -> bool {
 
 /// Prints the presets.
 pub fn list_presets(console: &Console) -> Result<()> {
-    let lines: Vec<String> = presets::PRESETS.iter().map(|p| format!("{:<20} {}", p.name, p.summary)).collect();
-    console.print(&lines.join("\n"))
+    console.print(&preset_lines(terminal::width()).join("\n"))
+}
+
+/// Names and what they stand for, side by side in so many columns.
+fn preset_lines(width: Option<usize>) -> Vec<String> {
+    /// Columns of the names.
+    const NAMES: usize = 21;
+    let of_preset = |preset: &Preset| -> Vec<String> {
+        let summary = match width {
+            Some(width) => terminal::wrapped(preset.summary, width.saturating_sub(NAMES).max(NAMES), 0),
+            None => vec![preset.summary.to_owned()],
+        };
+        let name = |line: usize| if line == 0 { preset.name } else { "" };
+        summary.iter().enumerate().map(|(line, text)| format!("{:<NAMES$}{text}", name(line))).collect()
+    };
+    presets::PRESETS.iter().flat_map(of_preset).collect()
 }
 
 /// The preset, or [`presets::DEFAULT`] where there is none, then file, then `--set`, then a constant `--env`, which a probe file so carries to `render`.
@@ -260,5 +275,22 @@ pub fn set_sky(config: &mut Config, trace: &TraceArgs) {
         // A map replaces the configured sky; its path has no place in the file.
         Some(EnvironmentSource::Map { .. }) => config.lights.sky = None,
         None => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presets_stand_in_columns_of_any_terminal() {
+        let names: Vec<&str> = presets::PRESETS.iter().map(|preset| preset.name).collect();
+        for width in [None, Some(40), Some(80), Some(200)] {
+            let lines = preset_lines(width);
+            let firsts: Vec<&str> =
+                lines.iter().filter_map(|line| line.split(' ').next()).filter(|n| !n.is_empty()).collect();
+            assert_eq!(firsts, names, "{width:?}");
+            assert!(width.is_none_or(|width| lines.iter().all(|line| line.chars().count() <= width)), "{lines:?}");
+        }
     }
 }

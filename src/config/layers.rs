@@ -9,7 +9,7 @@ use super::assignments::{self, Assignment, below, choice};
 use super::ron_text::{ConfigError, ron_options};
 use super::settings::Config;
 use super::{aliases, choices, messages, nearest, presets};
-use crate::system::input::read_file;
+use crate::system::input::read_text;
 
 /// Assignments in the order in which they count: a later one replaces an earlier one.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -55,8 +55,7 @@ impl Layers {
     /// As [`Self::text`]; the file cannot be read.
     pub fn file(self, path: &Path) -> Result<Layers, ConfigError> {
         let unreadable = |cause| ConfigError::Unreadable { path: path.to_owned(), cause };
-        let bytes = read_file(path).map_err(unreadable)?;
-        let text = String::from_utf8(bytes).map_err(|e| unreadable(std::io::Error::other(e.utf8_error())))?;
+        let text = read_text(path).map_err(unreadable)?;
         self.text(&text, &path.display().to_string())
     }
 

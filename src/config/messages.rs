@@ -34,6 +34,9 @@ pub fn of_value(error: &ron::Error, value: &str) -> String {
     match error {
         ron::Error::NoSuchStructField { expected, found, .. } => unknown_key(found, expected.iter().copied()),
         ron::Error::NoSuchEnumVariant { expected, found, .. } => unknown_choice(found, expected),
+        ron::Error::ExpectedDifferentStructName { found, .. } => {
+            format!("a list of keys in parentheses is expected, and '{found}' stands there; is it a RON file?")
+        }
         ron::Error::ExpectedNamedStructLike("Config") => {
             "the keys stand in parentheses, as in (grid: (spacing_m: 0.5)); () changes nothing".to_owned()
         }

@@ -33,7 +33,7 @@ pub mod written;
 
 pub use self::block::Block;
 pub use self::grids::Grids;
-pub use self::record::{ExportError, File};
+pub use self::record::{ExportError, File, RECORD};
 pub use self::rules::Rules;
 pub use self::target::Target;
 pub use self::written::{Export, Origin, Written};

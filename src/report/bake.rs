@@ -70,9 +70,9 @@ pub struct SolverReport {
     pub error_bound: Option<f64>,
     /// The same ÷ largest irradiance texel.
     pub error_bound_relative: Option<f64>,
-    /// Channels of sweeps that went on plainly because the residual had risen.
+    /// How often a colour channel went on without combining iterations, because combining had made its residual larger.
     pub plain_fallbacks: u64,
-    /// Texels of sweeps that went on plainly because a combination was negative there.
+    /// Texels that a combination had left negative. A plain iteration went on from them as 0.
     pub negative_texels: u64,
     /// Why frames or traced iterations ended: settled, or limit.
     pub stopped: Option<Stopped>,

@@ -24,8 +24,8 @@ const IRRADIANCE_COVARIANCE: &str = "irradiance_indirect_covariance";
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum ReferenceError {
     #[error(
-        "it has {found:?} pixels a side, the pictures have {wanted:?}; give --size {}x{} or another file",
-        found.0, found.1
+        "it has {0} × {1} pixels, the pictures have {2} × {3}; give --size {0}x{1} or another file",
+        found.0, found.1, wanted.0, wanted.1
     )]
     Size { found: (u32, u32), wanted: (u32, u32) },
     #[error("it has no layer '{layer}', only {found}; make it with `lightprobe reference`")]

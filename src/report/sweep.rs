@@ -228,6 +228,9 @@ pub struct GlossyFigures {
     pub bytes_per_probe: f64,
     /// `error_gltf.nrmse`.
     pub error_gltf: Option<f64>,
+    /// `error_gltf.relmse`: says of all pixels alike what `error_gltf` says of the few that mirror lamps.
+    #[serde(default)]
+    pub relmse_gltf: Option<f64>,
 }
 
 /// A configuration's probes lit by full paths.

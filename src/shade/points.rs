@@ -3,9 +3,11 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use crate::image::{Picture, auto_exposure};
 use crate::light::World;
 use crate::light::incident::at_bound;
 use crate::light::surface::SurfacePoint;
+use crate::math::color::luminance;
 use crate::math::random::{Purpose, Random};
 use crate::probe::query::QueryPoint;
 use crate::probe::store::surface::Facing;
@@ -42,6 +44,17 @@ pub struct View {
 }
 
 impl View {
+    /// The exposure, EV, that shows the surfaces of a picture of this view at mid grey. A sky behind them does not count:
+    /// before a bright one dark things would be black. Where there are no surfaces all of the picture counts.
+    pub fn auto_exposure_ev(&self, beauty: &Picture) -> f32 {
+        let mut pixels: Vec<u32> = self.points.iter().map(|point| point.pixel).collect();
+        pixels.dedup();
+        if pixels.is_empty() {
+            return beauty.auto_exposure_ev();
+        }
+        auto_exposure(pixels.into_iter().map(|pixel| luminance(beauty.pixels[pixel as usize])))
+    }
+
     /// How many points get so much from punctual lights that it is clamped, see
     /// [`LIGHT_MAX`](crate::scene::light::LIGHT_MAX).
     pub fn clamped(&self) -> u64 {

@@ -19,13 +19,19 @@ pub struct RayFigures {
     pub lost: u64,
 }
 
-/// Distance from a point's plane that counts for little, as a share of the distance to the viewer.
-const PLANE: f32 = 0.01;
+/// Power of the cosine between normals. The source gives its filter's radius and step only. This and the next two are the
+/// defaults of the filter in its authors' engine, G3D (`BilateralFilterSettings`: weights of normals, planes and depths of 1).
+const NORMAL_POWER: i32 = 4;
 
-/// Power of the cosine between normals.
-const NORMAL_POWER: i32 = 32;
+/// A pixel counts for nothing from this sine on of the angle between the plane of either surface and the way to the other.
+const PLANE_SINE: f32 = 0.5;
 
-/// Difference of roughness that counts for little.
+/// A pixel counts for nothing from this difference of distances to the viewer on, in spacings, as other lengths of the method;
+/// there 1 m.
+const DEPTH: f32 = 1.0;
+
+/// A pixel counts for nothing from this difference of roughness on: the same filter's with a weight of glossiness of 1, as the
+/// engine AnKi has it. G3D's default is 0: rough surfaces would get what smooth ones beside them mirror.
 const ROUGHNESS: f32 = 0.1;
 
 /// How the rays of a view are traced and filtered.
@@ -69,8 +75,7 @@ impl Rays<'_> {
         (self.filter(&radiance, roughness), figures)
     }
 
-    /// Means by a Gaussian of half the radius, the cosine between normals, a Gaussian of the distance from the point's plane, and
-    /// likeness of roughness.
+    /// Means by a Gaussian of half the radius and by likeness of normals, planes, depths and roughness ([`likeness`]).
     fn filter(&self, radiance: &[Option<Vec3>], roughness: impl Fn(usize) -> f32 + Sync) -> Vec<Vec3> {
         let (width, height) = (i64::from(self.view.width), i64::from(self.view.height));
         let mut first = vec![usize::MAX; (width * height) as usize];
@@ -95,12 +100,9 @@ impl Rays<'_> {
                 else {
                     continue;
                 };
-                let cosine = point.query.normal.dot(near.query.normal).max(0.0);
-                let away = (near.surface.position - point.surface.position).dot(point.query.normal);
-                let off = away / (PLANE * point.depth).max(f32::MIN_POSITIVE);
-                let rough = (roughness(other) - roughness(i)) / ROUGHNESS;
-                let apart = (dx * dx + dy * dy) as f32 * per_radius + off * off + rough * rough;
-                let weight = (-apart).exp() * cosine.powi(NORMAL_POWER);
+                let rough = 1.0 - (roughness(other) - roughness(i)).abs() / ROUGHNESS;
+                let weight = (-((dx * dx + dy * dy) as f32 * per_radius)).exp() * rough.max(0.0);
+                let weight = weight * likeness(point, near, DEPTH * self.tracing.spacing());
                 sum += light * weight;
                 total += weight;
             }
@@ -108,4 +110,17 @@ impl Rays<'_> {
         };
         self.view.points.par_iter().enumerate().map(mean).collect()
     }
+}
+
+/// How much two points are of one surface, 0 to 1. `depth`: the difference of their distances to the viewer from which on they
+/// are not, metres.
+fn likeness(a: &ImagePoint, b: &ImagePoint, depth: f32) -> f32 {
+    let cosine = a.query.normal.dot(b.query.normal).max(0.0);
+    let way = b.surface.position - a.surface.position;
+    let off = way.dot(a.query.normal).abs().max(way.dot(b.query.normal).abs());
+    // Of one place where there is no way between them.
+    let sine = if off > 0.0 { off / way.length() } else { 0.0 };
+    let flat = (1.0 - sine / PLANE_SINE).max(0.0);
+    let near = (1.0 - (b.depth - a.depth).abs() / depth).max(0.0);
+    cosine.powi(NORMAL_POWER) * flat * flat * near
 }

@@ -25,14 +25,24 @@ const TOLERANCE_LEAST: f32 = 1e-6;
 struct Variant {
     cause: &'static str,
     how: String,
-    /// `None` where it is off already.
+    /// `None` where it is off already, or cannot be switched off alone.
     config: Option<Config>,
+    /// Whether the error without it is known.
+    is_measured: bool,
 }
 
+/// Why a cause is not measured. Fitted values have little to do with the light where probes stand. Finer maps have more
+/// unknowns than points that they are fitted to, so they err more for another reason.
+const FITTED: &str = "not measured: the probes hold fitted values";
+
 fn variants(config: &Config) -> [Variant; 3] {
-    let mut angular = config.clone();
-    angular.capture.rays = config.capture.rays.doubled(MAX_RESOLUTION);
-    angular.store.irradiance = config.store.irradiance.doubled(MAX_RESOLUTION);
+    let angular = config.fit.is_none().then(|| {
+        let mut angular = config.clone();
+        angular.capture.rays = config.capture.rays.doubled(MAX_RESOLUTION);
+        angular.store.irradiance = config.store.irradiance.doubled(MAX_RESOLUTION);
+        angular
+    });
+    let finer = if angular.is_some() { "captures and irradiance of twice the angular resolution" } else { FITTED };
     let transport = config.transport.settled(TOLERANCE_SHARE, TOLERANCE_LEAST);
     let settled = (transport != config.transport).then(|| Config { transport, ..config.clone() });
     let exact = config.store.irradiance.exact().map(|irradiance| {
@@ -47,13 +57,9 @@ fn variants(config: &Config) -> [Variant; 3] {
     let bounces = "all bounces, to a tenth of the tolerance";
     let encoding = "irradiance stored in single precision";
     [
-        Variant {
-            cause: "angular_resolution",
-            how: "captures and irradiance of twice the angular resolution".to_owned(),
-            config: Some(angular),
-        },
-        Variant { cause: "bounces", how: or_already(bounces, &settled), config: settled },
-        Variant { cause: "encoding", how: or_already(encoding, &exact), config: exact },
+        Variant { cause: "angular_resolution", how: finer.to_owned(), is_measured: angular.is_some(), config: angular },
+        Variant { cause: "bounces", how: or_already(bounces, &settled), config: settled, is_measured: true },
+        Variant { cause: "encoding", how: or_already(encoding, &exact), config: exact, is_measured: true },
     ]
 }
 
@@ -90,7 +96,7 @@ pub fn measure(
     let mut causes = Vec::new();
     for variant in variants(config) {
         let Some(changed) = &variant.config else {
-            causes.push(cause(variant.cause, &variant.how, all));
+            causes.push(cause(variant.cause, &variant.how, all.filter(|_| variant.is_measured)));
             step();
             continue;
         };
@@ -125,9 +131,7 @@ pub fn measure(
             share: all.zip(own).filter(|(all, _)| *all > 0.0).map(|(all, own)| (own / all).powi(2)),
         });
     } else {
-        // Fitted values have little to do with the light where probes stand.
-        let how = "not measured: the probes hold fitted values";
-        causes.extend(["bake", "interpolation"].map(|name| cause(name, how, None)));
+        causes.extend(["bake", "interpolation"].map(|name| cause(name, FITTED, None)));
         step();
     }
     Ok(FloorReport {
@@ -143,6 +147,7 @@ pub fn measure(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::probe::fit::{Fit, RowSettings};
 
     #[test]
     fn every_variant_differs_in_its_cause_only() {
@@ -154,8 +159,12 @@ mod tests {
         assert_eq!(Config { transport: config.transport.clone(), ..bounces }, config);
         assert_eq!(encoding.store.irradiance.fineness().rounding, 2f64.powi(-24));
         assert!(variants(&encoding)[2].config.is_none());
-        let path = config.with_overrides(&["transport=paths(paths: 2)".to_owned()]).unwrap();
+        let path = config.clone().with_overrides(&["transport=paths(paths: 2)".to_owned()]).unwrap();
         assert!(variants(&path)[1].config.is_none());
+        let fitted = Config { fit: Fit::Rows(RowSettings::default()), ..config };
+        let [angular, bounces, _] = variants(&fitted);
+        assert!(angular.config.is_none() && !angular.is_measured && angular.how == FITTED);
+        assert!(bounces.config.is_some() && bounces.is_measured);
     }
 
     #[test]

@@ -22,7 +22,7 @@ use serde::Deserialize;
 use super::SweepError;
 use super::method::Method;
 use crate::config::{Config, ConfigError, Layers};
-use crate::system::input::read_file;
+use crate::system::input::read_text;
 
 /// Configurations of a sweep at most: more is a mistake in an axis.
 const MOST: usize = 4096;
@@ -95,8 +95,7 @@ impl LadderFile {
     /// [`SweepError::Unreadable`], [`SweepError::Ladder`].
     pub fn read(path: &Path) -> Result<LadderFile, SweepError> {
         let unreadable = |cause| SweepError::Unreadable { path: path.to_owned(), cause };
-        let bytes = read_file(path).map_err(unreadable)?;
-        let text = String::from_utf8(bytes).map_err(|e| unreadable(std::io::Error::other(e.utf8_error())))?;
+        let text = read_text(path).map_err(unreadable)?;
         LadderFile::parse(&text, path)
     }
 

@@ -236,6 +236,7 @@ impl Setting<'_, '_> {
                 shade_ms: glossy.shade_ms.median,
                 bytes_per_probe: glossy.bytes_per_probe,
                 error_gltf: glossy.error_gltf.as_ref().and_then(|error| error.all.figures.nrmse),
+                relmse_gltf: glossy.error_gltf.as_ref().and_then(|error| error.all.figures.relmse),
             }),
         }
     }

@@ -14,6 +14,14 @@ pub fn read_file(path: &Path) -> io::Result<Vec<u8>> {
     fs::read(path)
 }
 
+/// Text of a regular file.
+///
+/// # Errors
+/// As those of [`read_file`], and bytes that are no text.
+pub fn read_text(path: &Path) -> io::Result<String> {
+    String::from_utf8(read_file(path)?).map_err(|_| io::Error::other("it is no text (UTF-8)"))
+}
+
 /// Opens a regular file, for callers that read it piece by piece.
 ///
 /// # Errors

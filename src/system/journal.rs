@@ -195,6 +195,11 @@ pub fn is_journal(path: &Path) -> bool {
     open_file(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && &magic == MAGIC
 }
 
+/// Whether a file is a journal with anything behind its header.
+pub fn holds_records(path: &Path) -> bool {
+    is_journal(path) && fs::metadata(path).is_ok_and(|file| file.len() > HEADER_BYTES)
+}
+
 /// Deletes a journal; a file of the same name that is none is left alone.
 pub fn remove(path: &Path) {
     if is_journal(path) {

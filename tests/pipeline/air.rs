@@ -9,8 +9,9 @@ use lightprobe::scene::{self, LoadOptions};
 use lightprobe::shade::air::{Air, POINTS};
 use serde_json::Value;
 
-use crate::common::Folder;
+use crate::common::{Folder, Gltf};
 use crate::program::{bake, bake_physical, method, render, scene};
+use crate::shapes::{add, diffuse, quad, save};
 
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
@@ -134,4 +135,26 @@ fn an_object_that_the_bake_did_not_know_is_lit() {
     // 0.08 was found with the room behind it, and 0.44 by all probes of a cell, hidden ones too: twice the first is allowed.
     let whole = |name: &str| number(&method(&report, name)["error"]["nrmse"]);
     assert!(whole("visibility_on") < 0.16 && whole("visibility_off") > 0.3, "{report}");
+}
+
+/// A floor has no air inside of it, and nothing tells that of double-sided surfaces: things move above and below it.
+#[test]
+fn the_air_of_a_floor_is_not_inside_of_it() {
+    let folder = Folder::new();
+    let mut gltf = Gltf::new();
+    let mut material = diffuse([0.5; 3], [0.0; 3]);
+    material["doubleSided"] = true.into();
+    let (u, v) = ([6.0, 0.0, 0.0], [0.0, 0.0, 6.0]);
+    add(&mut gltf, &[quad([0.0; 3], u, v, 1), quad([0.0, 0.3, 0.0], v, u, 1)].concat(), material);
+    let floor = save(gltf, &folder, "floor");
+    let baked = bake(&folder, &floor, "--preset physical --env 1,1,1 --set grid.spacing_m=1");
+    let loaded = scene::load(&floor, &LoadOptions::default()).unwrap();
+    let world = World::new(&loaded, 1.0, 0.999).unwrap();
+    let probes = file::read(&baked.path).unwrap();
+    let volume = probes.volume_as_planned(loaded.origin_world);
+    let air = Air::new(&world, &Query { volume: &volume, settings: &probes.query.weights }, 0);
+    let height = |position: Vec3| position.y + loaded.origin_world.as_vec3().y;
+    let inside = air.points.iter().filter(|point| (0.0..0.3).contains(&height(point.position))).count();
+    // Two layers of probes 1 m apart: 0.3 of the height, known to 0.007.
+    assert!((inside as f64 / f64::from(POINTS) - 0.3).abs() < 0.036, "{inside}");
 }

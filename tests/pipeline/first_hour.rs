@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::process::{Command, Stdio};
 
 use crate::common::{Folder, Gltf};
-use crate::program::{bake, command, method, names_in, refuse, render, run, scene, succeed, text};
+use crate::program::{bake, command, finish, method, names_in, refuse, render, run, scene, succeed, text};
 use crate::shapes::{add, add_light, diffuse, quad, room, save};
 use serde_json::json;
 
@@ -14,11 +14,16 @@ fn mistakes_are_told_with_what_was_meant() {
     let folder = Folder::new();
     let (rooms, output) = (scene("two_rooms_open"), folder.path().join("out"));
     let baked = bake(&folder, &rooms, "--set grid.spacing_m=2");
+    let words = folder.write("words.txt", "root:x:0:0");
     let (rooms, probes, output) = (text(&rooms), text(&baked.path), text(&output));
     for (arguments, words) in [
         (&["render", probes, rooms, "-o", output][..], &["render SCENE PROBES", "is a probe file"][..]),
         (&["render", rooms, rooms, "-o", output], &["is a scene", "render SCENE PROBES"]),
-        (&["bake", probes, "-o", output], &["is a probe file"]),
+        (&["bake", probes, "-o", output], &["is a probe file", "`lightprobe bake SCENE -o OUT.probes`"]),
+        (&["sweep", probes, "-o", output], &["is a probe file", "`lightprobe sweep SCENE -o DIR`"]),
+        (&["render", rooms, text(folder.path()), "-o", output], &["is a folder", "export", "render SCENE PROBES"]),
+        (&["bake", rooms, "-o", output, "--config", rooms], &["is no text", "RON file"]),
+        (&["diff-report", probes, probes, "-o", output, "--thresholds", text(&words)], &["words.txt", "'root'", "RON"]),
         (&["view", probes, rooms, "-o", output], &["view SCENE PROBES"]),
         (&["inspect", rooms], &["is a scene", "inspect PROBES"]),
         (&["export", rooms, "--to", "three", "-o", output], &["is a scene", "export PROBES"]),
@@ -30,19 +35,65 @@ fn mistakes_are_told_with_what_was_meant() {
         (&["bake", rooms, "-o", output, "--set", "grid.spacing_m=1m"], &["write a number, such as 0.5"]),
         (&["bake", rooms, "-o", output, "--set", "grid.divisions=8"], &["three numbers, such as (8, 4, 8)"]),
         (&["bake", rooms, "-o", output, "--preset", "configs/presets/path.ron"], &["--config", "physical"]),
+        (&["help", "benches"], &["did you mean", "`lightprobe help` lists them"]),
     ] {
         let message = refuse(arguments);
         for word in words {
             assert!(message.contains(word), "no '{word}' in: {message}");
         }
     }
-    for (flag, value, word) in
-        [("--threads", "-1", "0 means one"), ("--threads", "two", "such as 2"), ("--seed", "-1", "from 0 to")]
-    {
+    // Nothing is near to it.
+    assert!(!refuse(&["help", "qqqq"]).contains("did you mean"));
+    for (flag, value, word) in [
+        ("--threads", "-1", "0 means one"),
+        ("--threads", "two", "such as 2"),
+        ("--seed", "-1", "from 0 to"),
+        ("--memory-budget", "-1GiB", "512MiB"),
+    ] {
         let run = run(&["bake", rooms, "-o", output, flag, value]);
         assert!(run.code == Some(2) && run.stderr.contains(word) && !run.stderr.contains("digit"), "{}", run.stderr);
     }
-    assert_eq!(names_in(folder.path()).len(), 1);
+    let run = run(&["render", rooms, probes, "-o", output, "--reference", "0"]);
+    assert!(run.code == Some(2) && run.stderr.contains("write a whole number from 1 to"), "{}", run.stderr);
+    assert_eq!(names_in(folder.path()).len(), 2);
+}
+
+/// Maps and a verdict of other sides would be taken for those of this comparison.
+#[test]
+fn a_comparison_leaves_nothing_of_an_earlier_one() {
+    let folder = Folder::new();
+    let rooms = scene("two_rooms_open");
+    let baked = bake(&folder, &rooms, "--set grid.spacing_m=2");
+    render(&folder, &rooms, &baked.path, "run", "--size 16x9");
+    let (pictures, output) = (folder.path().join("run"), folder.path().join("diff"));
+    succeed(&["diff-report", text(&pictures), text(&pictures), "-o", text(&output)]);
+    std::fs::write(output.join("difference of opinion.png"), "mine").unwrap();
+    let is_map = |name: &&String| name.starts_with("difference_");
+    assert!(names_in(&output).iter().any(|name| is_map(&name)), "{:?}", names_in(&output));
+    succeed(&["diff-report", text(&baked.path), text(&baked.path), "-o", text(&output)]);
+    let after = names_in(&output);
+    assert_eq!(after.iter().find(is_map), None, "{after:?}");
+    assert!(after.iter().any(|name| name == "difference of opinion.png"), "{after:?}");
+    // In a folder that no comparison wrote nothing is removed.
+    std::fs::write(output.join("diff.json"), "{}").unwrap();
+    std::fs::write(output.join("difference_mine.png"), "mine").unwrap();
+    succeed(&["diff-report", text(&baked.path), text(&baked.path), "-o", text(&output)]);
+    assert_eq!(std::fs::read(output.join("difference_mine.png")).unwrap(), b"mine");
+}
+
+/// Neither the result nor any work fits: nothing can be gone on from, and nothing is left.
+#[test]
+fn work_that_could_not_be_saved_is_not_promised() {
+    let folder = Folder::new();
+    let output = folder.path().join("a.probes");
+    let mut shell = Command::new("bash");
+    // Blocks of 1,024 bytes: less than a probe's capture.
+    shell.args(["-c", "ulimit -f 1; exec \"$0\" \"$@\""]).arg(command().get_program());
+    shell.args(["bake", text(&scene("cornell")), "-o", text(&output), "--checkpoint-every", "0"]);
+    let run = finish(shell.args(["--set", "grid.divisions=(3,3,3)"]));
+    assert_eq!(run.code, Some(2), "{}", run.stderr);
+    assert!(run.stderr.contains("ulimit -f unlimited") && !run.stderr.contains("--resume"), "{}", run.stderr);
+    assert_eq!(names_in(folder.path()), [""; 0]);
 }
 
 /// The set is replaced as a whole: maps of errors would be taken for those of the pictures beside them.
@@ -137,8 +188,10 @@ fn a_render_prints_a_row_for_each_figure() {
         for row in ["leak light ", "leak dark ", "blocks ", "look-up ", "look-up, of runs ", "memory per probe "] {
             assert!(shown.lines().any(|line| line.starts_with(row)), "{row}: {shown}");
         }
-        let has_error = shown.lines().any(|line| line.starts_with("error (nrmse) "));
-        assert_eq!(has_error, !reference.is_empty(), "{shown}");
+        for row in ["error (nrmse) ", "falsely black "] {
+            let is_there = shown.lines().any(|line| line.starts_with(row));
+            assert_eq!(is_there, !reference.is_empty(), "{row}: {shown}");
+        }
         let table = shown.lines().filter(|line| line.contains("  "));
         assert!(table.clone().count() > 10 && table.map(|line| line.chars().count()).max() <= Some(80), "{shown}");
     }

@@ -102,7 +102,8 @@ fn a_sweep_writes_report_table_and_plots() {
         for (name, figure) in configuration["figures"].as_object().expect("figures") {
             // Each is known here but those of a dark region, which the picture has not, and of gloss, which these probes have not.
             // Its mean lies between its ends.
-            if ["leak_dark_region", "error_gltf", "glossy_shade_ms", "glossy_bytes_per_probe"].contains(&name.as_str())
+            if ["leak_dark_region", "error_gltf", "relmse_gltf", "glossy_shade_ms", "glossy_bytes_per_probe"]
+                .contains(&name.as_str())
             {
                 continue;
             }

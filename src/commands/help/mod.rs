@@ -13,6 +13,9 @@ use crate::system::terminal;
 /// Columns of a text that goes to a file or a pipe.
 const WIDTH_OF_FILES: usize = 100;
 
+/// Share of a name's letters from which on another one may be meant.
+const LEAST_LIKENESS: f64 = 0.5;
+
 pub fn run(args: &HelpArgs, console: &Console) -> Result<()> {
     let mut cli = Cli::command();
     // Gives the subcommands the flags that all share.
@@ -28,9 +31,11 @@ pub fn run(args: &HelpArgs, console: &Console) -> Result<()> {
         return console.print(&markdown::text(topic.text, width));
     }
     let commands = cli.get_subcommands().map(clap::Command::get_name);
+    let near = |known: &&str| strsim::normalized_damerau_levenshtein(known, name) >= LEAST_LIKENESS;
     let nearest = commands
         .chain(TOPICS.iter().map(|topic| topic.name))
-        .min_by_key(|known| strsim::damerau_levenshtein(known, name))
-        .unwrap_or("help");
-    bail!("there is no command and no topic '{name}': did you mean '{nearest}'? `lightprobe help` lists them")
+        .filter(near)
+        .min_by_key(|known| strsim::damerau_levenshtein(known, name));
+    let meant = nearest.map_or_else(String::new, |nearest| format!(": did you mean '{nearest}'?"));
+    bail!("there is no command and no topic '{name}'{}; `lightprobe help` lists them", meant.trim_end_matches('?'))
 }

@@ -27,7 +27,7 @@ use crate::probe::query::{Answers, Query, QuerySettings};
 use crate::report::baked;
 use crate::report::render::{MethodReport, RenderReport, RenderTimes, SCHEMA};
 use crate::scene::{Camera, Detail};
-use crate::shade::points::see;
+use crate::shade::points::{View, see};
 use crate::shade::visibility_modes::VisibilityMode;
 use crate::system::format;
 use crate::system::memory::peak_memory_bytes;
@@ -281,7 +281,7 @@ fn render_camera<A: Answers>(run: &Run<A>, camera: &Camera, folder: &Path) -> Re
     bar.finish_and_clear();
     let shot = Shot { session, world: run.world, camera, view: &view };
     let reference = Reference::obtain(run.reference.as_ref(), shot, args.allow_scene_change)?;
-    let exposure_ev = args.exposure.unwrap_or_else(|| exposure(&shaded[2], reference.as_ref()));
+    let exposure_ev = args.exposure.unwrap_or_else(|| exposure(&view, &shaded[2], reference.as_ref()));
     scenery.shade_glossy(query, &masks, &mut shaded, reference.as_ref().and_then(Reference::glossy_layers));
     if let Some(reference) = &reference {
         let all = shaded.iter_mut().chain(&mut path_traced).chain(&mut by_rays).chain(&mut as_engine);
@@ -368,7 +368,7 @@ fn compare<'s>(
 }
 
 /// Exposure of the whole run: that of the reference, else of the picture with exact visibility.
-fn exposure(exact: &Shaded, reference: Option<&Reference>) -> f32 {
-    let own = || exact.image.picture("beauty").map_or(0.0, |p| p.auto_exposure_ev());
-    reference.map_or_else(own, |r| r.layers.beauty.auto_exposure_ev())
+fn exposure(view: &View, exact: &Shaded, reference: Option<&Reference>) -> f32 {
+    let own = || exact.image.picture("beauty").map_or(0.0, |picture| view.auto_exposure_ev(&picture));
+    reference.map_or_else(own, |r| view.auto_exposure_ev(&r.layers.beauty))
 }

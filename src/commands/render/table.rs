@@ -2,7 +2,7 @@
 
 use crate::evaluate::PATH_RAY;
 use crate::report::baked::BakedReport;
-use crate::report::error::{ErrorEstimate, ErrorReport};
+use crate::report::error::{ErrorEstimate, ErrorReport, TOO_NOISY};
 use crate::report::render::{MethodReport, RenderReport, Timing};
 use crate::report::table::{Column, Table};
 use crate::shade::visibility_modes::VisibilityMode;
@@ -39,6 +39,7 @@ const OF_REFERENCE: &[Row] = &[
     ("error (nrmse)", |m| errors_of(m).map_or(format::UNDEFINED.to_owned(), |e| relative_rmse(&e.all))),
     ("error in corners", |m| errors_of(m).map_or(format::UNDEFINED.to_owned(), |e| relative_rmse(&e.by_region.corner))),
     ("error elsewhere", |m| errors_of(m).map_or(format::UNDEFINED.to_owned(), |e| relative_rmse(&e.by_region.flat))),
+    ("falsely black", |m| percent(m.leak.black)),
     ("in the air: error", |m| {
         let error = m.air.standard_error.error.map(|e| 100.0 * e);
         format::or_undefined(m.air.error, |share| format!("{} %", format::with_error(100.0 * share, error)))
@@ -155,14 +156,19 @@ fn error_lines(report: &RenderReport, mean: Option<f64>) -> Vec<String> {
 /// What a method's gloss costs and how far it is off; `None` where it has none.
 fn glossy_line(method: &MethodReport) -> Option<String> {
     let glossy = method.glossy.as_ref()?;
+    // Mirrored lamps rule the one, all pixels alike the other.
+    let both = |error: &ErrorReport| {
+        let relmse = error.all.figures.relmse.map(|relmse| format!(", relmse {}", format::significant(relmse, 3)));
+        format!("{}{}", relative_rmse(&error.all), relmse.unwrap_or_default())
+    };
     let error = glossy.error_gltf.as_ref().map_or_else(String::new, |error| {
         let parts: Vec<String> = glossy
             .parts
             .iter()
-            .map(|part| format!("{} {}", part.name.replace('_', " "), relative_rmse(&part.error_gltf.all)))
+            .map(|part| format!("{} {}", part.name.replace('_', " "), both(&part.error_gltf)))
             .collect();
-        let parts = if parts.is_empty() { String::new() } else { format!(" ({})", parts.join(", ")) };
-        format!(", error_gltf {}{parts}", relative_rmse(&error.all))
+        let parts = if parts.is_empty() { String::new() } else { format!(" ({})", parts.join("; ")) };
+        format!(", error_gltf {}{parts}", both(error))
     });
     let traced = glossy.traced.map_or_else(String::new, |traced| {
         format!(
@@ -213,5 +219,8 @@ fn verdicts(errors: &[(&str, &ErrorReport)]) -> Vec<String> {
             }
         }
     }
-    found.into_iter().map(|(verdict, about)| format!("  {verdict} ({})", about.join(", "))).collect()
+    let remedy = |verdict: &str| {
+        if verdict == TOO_NOISY { ": its noise exceeds the difference; give it more samples" } else { "" }
+    };
+    found.into_iter().map(|(verdict, about)| format!("{verdict} ({}){}", about.join(", "), remedy(verdict))).collect()
 }

@@ -17,7 +17,7 @@ use self::methods::{check_all, configurations, ladders, shades_gloss, shared, sh
 use self::work::Work;
 use super::camera::cameras;
 use super::session::{Opening, Session, list_presets, lists_presets};
-use super::{Console, check_picture_memory, tell};
+use super::{Console, check_picture_memory, kinds, tell};
 use crate::cli::SweepArgs;
 use crate::evaluate::{Comparison, Scenery};
 use crate::light::bsdf::ReflectionModel;
@@ -43,6 +43,7 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
     if args.view.camera.as_deref() == Some("all") {
         bail!("--camera all: a sweep is of one camera; name one");
     }
+    kinds::expect_scene(&args.scene, "sweep SCENE -o DIR")?;
     let file = args.ladder.as_deref().map(LadderFile::read).transpose()?;
     let mut ladders = ladders(args, file.as_ref())?;
     let (config, keep_images) = shared(&ladders)?;
@@ -80,7 +81,7 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
     let scenery = Scenery { world: &world, view: &view, primary_s, seed: session.seed };
     let regions = regions(&world, &view);
     let (mean, standard_error) = reference.layers.means(|i| regions[i].is_some());
-    let exposure_ev = reference.layers.beauty.auto_exposure_ev();
+    let exposure_ev = view.auto_exposure_ev(&reference.layers.beauty);
     let setting = Setting {
         scenery,
         comparison: Comparison {

@@ -92,6 +92,7 @@ fn csv(report: &SweepReport) -> Result<Vec<u8>> {
                 ("error_bias", number(e.bias)),
                 ("error_flip", number(e.flip)),
                 ("error_gltf", number(m.glossy.and_then(|glossy| glossy.error_gltf))),
+                ("relmse_gltf", number(m.glossy.and_then(|glossy| glossy.relmse_gltf))),
                 ("glossy_shade_ms", number(m.glossy.map(|glossy| glossy.shade_ms))),
                 ("glossy_bytes_per_probe", number(m.glossy.map(|glossy| glossy.bytes_per_probe))),
             ];

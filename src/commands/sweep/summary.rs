@@ -57,6 +57,7 @@ const FIGURES: &[(&str, Figure)] = &[
     ("error_bias", |_, m| m.error.bias),
     ("error_flip", |_, m| m.error.flip),
     ("error_gltf", |_, m| m.glossy?.error_gltf),
+    ("relmse_gltf", |_, m| m.glossy?.relmse_gltf),
     ("glossy_shade_ms", |_, m| m.glossy.map(|glossy| glossy.shade_ms)),
     ("glossy_bytes_per_probe", |_, m| m.glossy.map(|glossy| glossy.bytes_per_probe)),
 ];

@@ -1,10 +1,13 @@
 //! A sweep's report for people.
 
 use crate::report::sweep::{
-    Aggregate, AxisValue, CheapestAt, ConfigurationReport, EqualReport, FloorReport, SweepReport,
+    Aggregate, AxisValue, CheapestAt, ConfigurationReport, EqualReport, FloorCause, FloorReport, SweepReport,
 };
 use crate::report::table::{Column, Table};
 use crate::system::format;
+
+/// Shares of an error that are smaller are of no account, whatever their sign.
+const HIDES: f64 = 0.01;
 
 /// All tables.
 pub fn text(report: &SweepReport) -> String {
@@ -40,6 +43,15 @@ fn percent(value: Option<f64>) -> String {
     format::or_undefined(value, format::percent)
 }
 
+/// The share of the squared error that goes with a cause. Below zero the error grows without it: it hid another.
+fn share_of(cause: &FloorCause) -> String {
+    match cause.share {
+        Some(share) if share < -HIDES => "hides another".to_owned(),
+        Some(share) if share < 0.0 => format::percent(0.0),
+        share => percent(share),
+    }
+}
+
 /// Whether every ladder is one point: methods side by side.
 fn is_comparison(report: &SweepReport) -> bool {
     report.ladders.iter().all(|ladder| ladder.configurations.len() == 1)
@@ -52,7 +64,7 @@ fn typical(configuration: &ConfigurationReport, figure: &str) -> Option<f64> {
 /// A row for each method.
 fn comparison(report: &SweepReport) -> String {
     let has_gloss = report.configurations.iter().any(|c| typical(c, "glossy_shade_ms").is_some());
-    let gloss = [("error_gltf", Column::Number), ("gloss shade", Column::Number), ("gloss per probe", Column::Number)];
+    let gloss = ["error_gltf", "relmse_gltf", "gloss shade", "gloss per probe"].map(|name| (name, Column::Number));
     let columns = [
         ("method", Column::Text),
         ("probes", Column::Number),
@@ -92,6 +104,7 @@ fn comparison(report: &SweepReport) -> String {
         ];
         if has_gloss {
             cells.push(share("error_gltf"));
+            cells.push(format::or_undefined(typical("relmse_gltf"), |relmse| format::significant(relmse, 3)));
             cells.push(format::or_undefined(typical("glossy_shade_ms"), |ms| format::seconds(ms / 1e3)));
             cells.push(format::or_undefined(typical("glossy_bytes_per_probe"), |b| format::bytes(b.round() as u64)));
         }
@@ -186,7 +199,7 @@ fn floors(floors: &[FloorReport]) -> String {
                 String::new(),
                 cause.cause.replace('_', " "),
                 percent(cause.error_relative),
-                percent(cause.share),
+                share_of(cause),
                 cause.how.clone(),
             ]);
         }

@@ -59,6 +59,11 @@ fn texel_and_light((texel, light): &(u32, Vec3)) -> [u8; 16] {
     floats([f32::from_bits(*texel), light.x, light.y, light.z])
 }
 
+fn of_texel_and_light(bytes: [u8; 16]) -> Option<(u32, Vec3)> {
+    let [texel, x, y, z] = of_floats(&bytes);
+    Some((texel.to_bits(), Vec3::new(x, y, z)))
+}
+
 fn two_vectors((a, b): &(Vec3, Vec3)) -> [u8; 24] {
     floats([a.x, a.y, a.z, b.x, b.y, b.z])
 }
@@ -66,9 +71,10 @@ fn two_vectors((a, b): &(Vec3, Vec3)) -> [u8; 24] {
 /// Bytes of a packed capture: with room for all of it the writer does not grow, which would take twice as much.
 fn packed_bytes(capture: &ProbeCapture, filtered: &[Vec2]) -> usize {
     /// Counts and lengths of lists.
-    const NUMBERS: usize = 6 + 7;
-    let ProbeCapture { surfels, geometric, emitted, emitter_samples, seen, backs, .. } = capture;
-    let lists = surfels.len() * Surfel::BYTES + geometric.len() * 4 + emitted.len() * 16 + emitter_samples.len() * 24;
+    const NUMBERS: usize = 6 + 8;
+    let ProbeCapture { surfels, geometric, emitted, shown, emitter_samples, seen, backs, .. } = capture;
+    let light = (emitted.len() + shown.len()) * 16 + emitter_samples.len() * 24;
+    let lists = surfels.len() * Surfel::BYTES + geometric.len() * 4 + light;
     8 * NUMBERS + lists + seen.len() * 20 + backs.len() * 4 + filtered.len() * 8
 }
 
@@ -81,6 +87,7 @@ pub fn pack(capture: &ProbeCapture, filtered: &[Vec2]) -> Vec<u8> {
     out.list(&capture.surfels, |surfel| surfel.to_bytes());
     out.list(&capture.geometric, |normal| normal.to_bytes());
     out.list(&capture.emitted, texel_and_light);
+    out.list(&capture.shown, texel_and_light);
     out.list(&capture.emitter_samples, two_vectors);
     out.list(&capture.seen, |seen| floats::<5, 20>(seen.numbers()));
     out.list(&capture.backs, |texel| texel.to_le_bytes());
@@ -98,10 +105,8 @@ pub fn unpack(bytes: &[u8]) -> Option<(ProbeCapture, Vec<Vec2>)> {
         texels,
         surfels: from.list(Surfel::of_bytes)?,
         geometric: from.list(|bytes| Some(PackedNormal::of_bytes(bytes)))?,
-        emitted: from.list(|bytes: [u8; 16]| {
-            let [texel, x, y, z] = of_floats(&bytes);
-            Some((texel.to_bits(), Vec3::new(x, y, z)))
-        })?,
+        emitted: from.list(of_texel_and_light)?,
+        shown: from.list(of_texel_and_light)?,
         emitter_samples: from.list(|bytes: [u8; 24]| {
             let [a, b, c, x, y, z] = of_floats(&bytes);
             Some((Vec3::new(a, b, c), Vec3::new(x, y, z)))
@@ -141,6 +146,7 @@ mod tests {
             surfels: (0..9).map(|i| surfel(i, vector())).collect(),
             geometric: (0..9).map(|_| PackedNormal::of(vector().normalize())).collect(),
             emitted: vec![(u32::MAX, vector()), (0x7fa0_0000, vector())],
+            shown: vec![(5, vector())],
             emitter_samples: vec![(vector(), vector())],
             distances: Vec::new(),
             seen: vec![Seen::of_numbers([0.1, 0.2, 0.3, 4.0, 0.5]); 3],

@@ -56,6 +56,8 @@ pub struct ProbeCapture {
     /// Texels in which surfaces or the sky emit, with the radiance, weighted against `emitter_samples`, W·m⁻²·sr⁻¹; a
     /// texel may come more than once.
     pub emitted: Vec<(u32, Vec3)>,
+    /// The same in full, for those who look at what the probe sees; empty where no one does, and where nothing is weighted.
+    pub shown: Vec<(u32, Vec3)>,
     /// Directions towards sampled emitters, each with radiance ÷ density, W·m⁻².
     pub emitter_samples: Vec<(Vec3, Vec3)>,
     /// Per texel: distances, clamped, metres; empty where no one asks for them.
@@ -85,7 +87,7 @@ impl ProbeCapture {
     pub fn bytes(&self) -> u64 {
         (self.surfels.capacity() * size_of::<Surfel>()
             + self.geometric.capacity() * size_of::<PackedNormal>()
-            + self.emitted.capacity() * size_of::<(u32, Vec3)>()
+            + (self.emitted.capacity() + self.shown.capacity()) * size_of::<(u32, Vec3)>()
             + self.emitter_samples.capacity() * size_of::<(Vec3, Vec3)>()
             + self.distances.capacity() * size_of::<Moments>()
             + self.seen.capacity() * size_of::<Seen>()
@@ -93,10 +95,19 @@ impl ProbeCapture {
             + size_of::<ProbeCapture>()) as u64
     }
 
-    /// Emitted radiance in every texel.
+    /// Emitted radiance in every texel, weighted against the emitters that are sampled: part of what adds up to irradiance.
     pub fn emitted_radiance(&self) -> Vec<Vec3A> {
+        self.in_texels(&self.emitted)
+    }
+
+    /// The same in full: what is there to be seen.
+    pub fn shown_radiance(&self) -> Vec<Vec3A> {
+        self.in_texels(if self.shown.is_empty() { &self.emitted } else { &self.shown })
+    }
+
+    fn in_texels(&self, light: &[(u32, Vec3)]) -> Vec<Vec3A> {
         let mut radiance = vec![Vec3A::ZERO; self.texels];
-        self.emitted.iter().for_each(|&(texel, emitted)| radiance[texel as usize] += Vec3A::from(emitted));
+        light.iter().for_each(|&(texel, light)| radiance[texel as usize] += Vec3A::from(light));
         radiance
     }
 
@@ -116,7 +127,7 @@ impl ProbeCapture {
         let kernel = &resampling.kernel;
         let mut surfel_of = vec![u32::MAX; self.texels];
         self.surfels.iter().enumerate().for_each(|(i, s)| surfel_of[s.texel as usize] = i as u32);
-        let emitted_of = self.emitted_radiance();
+        let light_of = [&self.emitted, &self.shown].map(|light| self.in_texels(light));
         let asked = |list: usize| if list > 0 { kernel.rows() } else { 0 };
         let mut out = ProbeCapture {
             texels: kernel.rows(),
@@ -126,6 +137,7 @@ impl ProbeCapture {
             seen: vec![Seen::default(); asked(self.seen.len())],
             emitter_samples: self.emitter_samples,
             emitted: Vec::new(),
+            shown: Vec::new(),
             backs: Vec::new(),
             rays: self.rays,
             hits_outside_volume: self.hits_outside_volume,
@@ -133,11 +145,10 @@ impl ProbeCapture {
             light_clamped: self.light_clamped,
         };
         for o in 0..kernel.rows() {
-            let (mut direct, mut albedo, mut emitted) = (Vec3::ZERO, Vec3::ZERO, Vec3A::ZERO);
+            let (mut direct, mut albedo) = (Vec3::ZERO, Vec3::ZERO);
             let mut nearest = (0.0, u32::MAX);
             for &(t, w) in kernel.row(o) {
                 let t = t as usize;
-                emitted += emitted_of[t] * w;
                 if let Some(surfel) = self.surfels.get(surfel_of[t] as usize) {
                     direct += surfel.direct_radiance * w;
                     albedo += surfel.albedo() * w;
@@ -152,8 +163,11 @@ impl ProbeCapture {
                     to.add_scaled(from, w);
                 }
             }
-            if emitted != Vec3A::ZERO {
-                out.emitted.push((o as u32, emitted.into()));
+            for (light, of) in [&mut out.emitted, &mut out.shown].into_iter().zip(&light_of) {
+                let mean = kernel.row(o).iter().map(|&(t, w)| of[t as usize] * w).sum::<Vec3A>();
+                if mean != Vec3A::ZERO {
+                    light.push((o as u32, mean.into()));
+                }
             }
             if let Some(surfel) = self.surfels.get(nearest.1 as usize) {
                 out.surfels.push(surfel.in_texel(o as u32, albedo, direct));

@@ -126,6 +126,8 @@ pub struct Capture<'w, 's> {
     pub keeps_geometric: bool,
     /// Whether normals and distances of the surfaces are asked for.
     pub sees: bool,
+    /// Whether someone looks at the radiance: emission is kept in full, too, where it is weighted.
+    pub shows: bool,
     /// Of [`Rays::resampling`].
     pub resampling: Option<&'w Resampling>,
     /// Where guided rays go; `None`: there are none.
@@ -270,7 +272,7 @@ impl Capture<'_, '_> {
             None => (scene.environment.radiance(ray.direction), 0.0),
         };
         if radiance != Vec3::ZERO {
-            out.emitted.push((ray.texel, radiance * (gathered_share(ray, expected) * ray.share)));
+            self.keep_emitted(ray, radiance, expected, centre, out);
         }
         if let Some(clamp) = self.distance_clamp_m {
             out.distances[ray.texel as usize].add(f64::from(clamp), f64::from(ray.share));
@@ -302,7 +304,22 @@ impl Capture<'_, '_> {
                 let found = emitters.group_of_hit(receiver, ray.direction, &surface.hit);
                 found.map_or(0.0, |(group, density)| draws[group].expected * density)
             });
-            out.emitted.push((ray.texel, surface.emission * (gathered_share(ray, expected) * ray.share)));
+            self.keep_emitted(ray, surface.emission, expected, centre, out);
+        }
+    }
+
+    /// Keeps what is emitted along a ray, where this many emitter samples per solid angle are expected in its direction, sr⁻¹.
+    fn keep_emitted(
+        &self,
+        ray: &TexelRay,
+        radiance: Vec3,
+        expected: f32,
+        centre: Option<&Centre>,
+        out: &mut ProbeCapture,
+    ) {
+        out.emitted.push((ray.texel, radiance * (gathered_share(ray, expected) * ray.share)));
+        if self.shows && centre.is_some() {
+            out.shown.push((ray.texel, radiance * ray.share));
         }
     }
 

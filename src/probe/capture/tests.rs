@@ -32,6 +32,7 @@ fn capture<'a>(
         voxels: None,
         keeps_geometric: true,
         sees: true,
+        shows: true,
         resampling,
         guide: None,
         counts: None,
@@ -93,6 +94,27 @@ fn cubes_and_octahedral_maps_see_the_same_light() {
             assert!((a - b).abs().max_element() < 0.075 * largest, "{what}: {a} {b}");
         }
     }
+}
+
+/// What emitter samples take over of a lamp's light is not missing where someone looks at the probe: its texels show the lamp as
+/// bright as it is, whether it is sampled or not.
+#[test]
+fn lamps_are_shown_in_full() {
+    let scene = scene("cornell");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let (low, high) = scene.mesh.bounds().unwrap();
+    let of_samples = |probe_emitter_samples| {
+        let settings = CaptureSettings { rays: octahedral(N, 1), probe_emitter_samples, ..Default::default() };
+        capture(&world, &settings, None).probe(0, 0.5 * (low + high), |_| true)
+    };
+    let brightest = |texels: Vec<Vec3A>| texels.into_iter().fold(Vec3A::ZERO, Vec3A::max).max_element();
+    let (plain, sampled) = (of_samples(0), of_samples(64));
+    assert!(plain.shown.is_empty() && !sampled.emitter_samples.is_empty());
+    assert_eq!(plain.shown_radiance(), plain.emitted_radiance());
+    let lamp = brightest(plain.emitted_radiance());
+    assert_eq!(brightest(sampled.shown_radiance()), lamp);
+    // A probe's 64 samples are several times as dense in a lamp's directions as rays to 32² texels are.
+    assert!(brightest(sampled.emitted_radiance()) < 0.5 * lamp);
 }
 
 /// In a room of flat walls distances are the same under the lobe of the moments, and where a texel's lobe lies on one wall.

@@ -271,7 +271,7 @@ impl Grid {
 
     /// Cells along each axis; a single layer of probes makes one layer of cells.
     #[inline]
-    fn cells_along(&self) -> UVec3 {
+    pub fn cells_along(&self) -> UVec3 {
         (self.divisions - UVec3::ONE).max(UVec3::ONE)
     }
 

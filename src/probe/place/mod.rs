@@ -5,6 +5,7 @@
 pub mod air;
 mod ddgi;
 pub mod lend;
+mod look;
 mod need;
 pub mod overlap;
 mod piece;
@@ -14,6 +15,7 @@ mod settings;
 mod settle;
 mod stage;
 pub mod survey;
+pub mod surveyor;
 mod tally;
 #[cfg(test)]
 mod tests;

@@ -119,32 +119,32 @@ fn need(world: &World, grid: &Grid, table: &SurfaceVisibility, cell: CellIndex, 
     Need { point: behind + normal * open, normal }
 }
 
-/// For every entry that sees none of its eight probes: the nearest active probe of the cells around that it sees.
+/// For every entry that sees none of its eight probes and is in the open: the nearest active probe of the cells around that
+/// it sees.
 pub fn far_probes(
     world: &World,
     grid: &Grid,
     placement: &Placement,
-    table: &SurfaceVisibility,
+    survey: &Survey,
     settings: &SurveySettings,
 ) -> Vec<(u32, u32)> {
     let of_cell = |cell: u32| -> Vec<(u32, u32)> {
         let cell = CellIndex(cell);
-        let in_need: Vec<Entry> = table.entries(cell).filter(|entry| entry.mask == 0).collect();
+        let is_in_need = |entry: &Entry| entry.mask == 0 && survey.open[entry.index].is_some();
+        let in_need: Vec<Entry> = survey.table.entries(cell).filter(is_in_need).collect();
         if in_need.is_empty() {
             return Vec::new();
         }
         let is_active = |probe: &ProbeIndex| placement.states[probe.0 as usize] == ProbeState::Active;
         let rings: Vec<Vec<ProbeIndex>> =
             (1..=settings.far_rings).map(|ring| grid.ring(cell, ring).filter(is_active).collect()).collect();
+        let nearest = |entry: &Entry| {
+            let need = need(world, grid, &survey.table, cell, entry, settings.voxel_margin);
+            let seen = rings.iter().find_map(|ring| nearest_visible(&world.tracer, placement, ring, &need))?;
+            Some((entry.index as u32, seen.0))
+        };
         // Some cells have most of them: their entries are work for all threads.
-        in_need
-            .par_iter()
-            .filter_map(|entry| {
-                let need = need(world, grid, table, cell, entry, settings.voxel_margin);
-                let seen = rings.iter().find_map(|ring| nearest_visible(&world.tracer, placement, ring, &need))?;
-                Some((entry.index as u32, seen.0))
-            })
-            .collect()
+        in_need.par_iter().filter_map(nearest).collect()
     };
     // Cells come in order, and so do a cell's entries: the list is sorted.
     (0..grid.cell_count() as u32).into_par_iter().flat_map_iter(of_cell).collect()

@@ -143,14 +143,15 @@ impl SettleSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SurveySettings {
-    /// Points tried on a surface within one voxel at first. 1: `light` +0.002 in office, `dark` +0.003 in thin_wall, for 0.63
+    /// Points tried on a surface within one voxel at first, where it sees otherwise than the voxels around or is not the only
+    /// one; elsewhere one point is enough. 1: `light` +0.002 in office, `dark` +0.003 in thin_wall, for 0.63
     /// to 0.87 × the rays; 4: at most 0.0013, for 1.2 to 1.7 ×.
     pub first_points: u32,
     /// Points tried in all where the first ones disagree. 4 or 16: at most 5e-4.
     pub all_points: u32,
     /// Points tried on the outside of a surface until one sees any probe: where walls meet, most of a voxel's surface may
     /// lie inside the other wall, and the strip that does not must still be found. 8: `dark` +3e-4 in office, for 0.73 to 0.93 ×
-    /// the rays; 128: none, for 1.1 to 1.7 ×.
+    /// the rays; 128: none, for 1.1 to 1.7 ×. Where no one around sees any, the first points have to do.
     pub search_points: u32,
     /// Voxels are taken larger by this share of their side on every side when surfaces are sorted into them, so that a
     /// surface on the border of two is known in both, on whichever side of it rounding puts the point that asks. 0: at most

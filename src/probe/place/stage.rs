@@ -4,7 +4,7 @@ use super::lend::lend;
 use super::placement::{Placement, PlacementTask};
 use super::settings::PlacementRule;
 use super::settle::{Settler, settle_all};
-use super::survey::Surveyor;
+use super::surveyor::Surveyor;
 use super::walls::walls;
 use super::{air, need};
 use crate::light::World;
@@ -34,7 +34,7 @@ pub fn place(world: &World, task: &PlacementTask, surveying: impl FnOnce()) -> P
     // Only where shading asks this very table does it need a probe for every entry, and does a probe that no surface sees
     // weigh nothing.
     if occlusion.keeps_survey() {
-        found.table.far = need::far_probes(world, grid, &placement, &found.table, &settings.survey);
+        found.table.far = need::far_probes(world, grid, &placement, &found, &settings.survey);
         leave_unseen(&world.scene.mesh, grid, &mut placement, &found.table, settings.keep_unsampled);
         let (seen, rays) = air::seen(world, grid, &placement, &found.table);
         placement.rays += rays + lend(world, grid, &mut found, &seen);

@@ -1,28 +1,24 @@
 //! The survey that fills a [`SurfaceVisibility`]: rays from points of every surface to the eight probes of its cell.
 //!
+//! A glance at every voxel comes first. Where it sees otherwise than the voxels around, more points are asked: shadows have edges
+//! in few voxels, and most others say what their neighbours say.
+//!
 //! It depends on the scene, the grid and the probes alone, not on the seed: what a bake knows of visibility is as fixed as its
 //! grid, and two bakes that differ by chance do not differ in it.
 
-use glam::{UVec3, Vec2, Vec3};
+use glam::{UVec3, Vec3};
 use rayon::prelude::*;
 
-use super::overlap::triangle_meets_box;
-use super::piece::Piece;
+use super::look::{Depth, Found, Look, looks};
 use super::placement::Placement;
-use super::settings::SurveySettings;
-use super::tally::Tally;
-use crate::light::World;
-use crate::light::contact::{Facet, sight_line};
-use crate::math::random::{KroneckerSequence, Purpose, Random, unit_from_bits};
-use crate::probe::lattice::grid::{CellIndex, Grid, ProbeIndex, block};
+use super::surveyor::{Met, Surveyor};
+use crate::probe::lattice::grid::{Grid, ProbeIndex, block};
 use crate::probe::store::regions::Rank;
-use crate::probe::store::surface::{Facing, SurfaceVisibility, active_corners, key, voxel_of_key};
+use crate::probe::store::surface::{Facing, SurfaceVisibility, key, voxel_of_key};
 use crate::scene::{Mesh, TriangleIndex};
-use crate::trace::Ray;
-use crate::trace::offset::ray_offset;
 
 /// Memory that a survey takes at most: one [`Met`] for each triangle in each voxel that it meets, twice while they are
-/// collected. A triangle meets as many voxels as its area covers, those along its edges, and one.
+/// collected, and then one look of each. A triangle meets as many voxels as its area covers, those along its edges, and one.
 pub fn estimated_bytes(mesh: &Mesh, grid: &Grid, voxels_per_cell: u32) -> u64 {
     /// A tilted plane passes through more voxels than its area has faces, √3 times as many at most.
     const TILT: f64 = 1.733;
@@ -40,7 +36,7 @@ pub fn estimated_bytes(mesh: &Mesh, grid: &Grid, voxels_per_cell: u32) -> u64 {
         (TILT * area + 2.0 * edges + 1.0).min(faces)
     };
     let total: f64 = (0..mesh.triangles.len() as u32).into_par_iter().map(voxels).sum();
-    (total * (2 * size_of::<Met>()) as f64) as u64
+    (total * (size_of::<Met>() + size_of::<Met>().max(size_of::<Look>() + size_of::<Found>())) as f64) as u64
 }
 
 /// A table with what is known beside it while baking.
@@ -67,122 +63,7 @@ impl Survey {
     }
 }
 
-/// A triangle in one voxel. Small, for there are millions and they are sorted.
-#[derive(Debug, Clone, Copy)]
-pub struct Met {
-    pub cell: CellIndex,
-    pub triangle: u32,
-    /// Of the voxel with [`Facing::ALL`]'s first facing.
-    pub voxel_key: u16,
-    /// Of the front.
-    pub facing: Facing,
-}
-
-impl Met {
-    /// By cell, voxel and triangle. As one number, which compares without a branch.
-    fn order(&self) -> u128 {
-        u128::from(self.cell.0) << 48 | u128::from(self.voxel_key) << 32 | u128::from(self.triangle)
-    }
-}
-
-/// One side of a triangle in a voxel.
-#[derive(Debug, Clone, Copy)]
-struct Side {
-    triangle: TriangleIndex,
-    /// Whether this is the back of the triangle.
-    is_back: bool,
-}
-
-/// What is known of one side of a voxel.
-#[derive(Debug, Clone, Copy)]
-struct Found {
-    cell: CellIndex,
-    key: u16,
-    mask: u8,
-    is_front: bool,
-    open: Option<Vec3>,
-    /// Whether anything there asks: not the inside of a solid, nor a voxel that an edge merely touches.
-    asks: bool,
-    rays: u64,
-}
-
-/// The surfaces in every voxel of a grid.
-pub struct Surveyor<'a, 's> {
-    pub world: &'a World<'s>,
-    pub grid: &'a Grid,
-    /// Voxels along each axis of a cell.
-    pub n: u32,
-    pub settings: &'a SurveySettings,
-    /// By cell, voxel and triangle.
-    pub met: Vec<Met>,
-}
-
-impl<'a, 's> Surveyor<'a, 's> {
-    /// Sorts every surface within the grid's hull into `voxels_per_cell` voxels along each axis of a cell.
-    pub fn new(world: &'a World<'s>, grid: &'a Grid, voxels_per_cell: u32, settings: &'a SurveySettings) -> Self {
-        let mut surveyor = Surveyor { world, grid, n: voxels_per_cell, settings, met: Vec::new() };
-        // One triangle may be a whole floor: its cells are work for all threads.
-        let triangles = world.scene.mesh.triangles.len() as u32;
-        let cells_of = |t: u32| surveyor.cells_of(t).map(move |cell| (t, cell));
-        let in_cells: Vec<(u32, CellIndex)> = (0..triangles).into_par_iter().flat_map_iter(cells_of).collect();
-        surveyor.met = in_cells.par_iter().flat_map_iter(|&(t, cell)| surveyor.met_in(t, cell)).collect();
-        surveyor.met.par_sort_unstable_by_key(Met::order);
-        surveyor
-    }
-
-    pub fn mesh(&self) -> &'a Mesh {
-        &self.world.scene.mesh
-    }
-
-    /// Voxels' margin in cells.
-    fn margin(&self) -> f32 {
-        self.settings.voxel_margin / self.n as f32
-    }
-
-    /// Cells that a triangle meets.
-    fn cells_of(&self, triangle: u32) -> impl Iterator<Item = CellIndex> {
-        let corners = self.mesh().corners(TriangleIndex(triangle));
-        let (low, high) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
-        let margin = self.margin();
-        let (beyond, _) = self.grid.is_beyond(low, high, margin);
-        let cells = (!beyond).then(|| self.grid.cells_near(low, high, margin)).into_iter().flatten();
-        // The box of a small triangle is in one cell, and so is it.
-        let within = cells.clone().nth(1).is_none();
-        cells.filter(move |&cell| {
-            let local = || corners.map(|c| self.grid.cell_from_scene(cell, c) - 0.5);
-            within || triangle_meets_box(local(), Vec3::splat(0.5 + margin))
-        })
-    }
-
-    /// A triangle in every voxel of a cell that it meets.
-    fn met_in(&self, triangle: u32, cell: CellIndex) -> impl Iterator<Item = Met> {
-        let margin = self.settings.voxel_margin;
-        let scaled = self.mesh().corners(TriangleIndex(triangle)).map(|c| self.in_voxels(cell, c));
-        let low = scaled[0].min(scaled[1]).min(scaled[2]) - margin;
-        let high = scaled[0].max(scaled[1]).max(scaled[2]) + margin;
-        let last = UVec3::splat(self.n - 1);
-        let (low, high) = (low.max(Vec3::ZERO).as_uvec3().min(last), high.max(Vec3::ZERO).as_uvec3().min(last));
-        let facing = Facing::of(self.mesh().geometric_normal(TriangleIndex(triangle)));
-        // Small triangles are wholly in one voxel.
-        let within = low == high;
-        let meets = move |voxel: &UVec3| {
-            let centre = voxel.as_vec3() + 0.5;
-            within || triangle_meets_box(scaled.map(|c| c - centre), Vec3::splat(0.5 + margin))
-        };
-        let n = self.n;
-        block(low, high).filter(meets).map(move |voxel| Met {
-            cell,
-            triangle,
-            voxel_key: key(voxel, Facing::ALL[0], n),
-            facing,
-        })
-    }
-
-    /// A position in units of a cell's voxels.
-    pub fn in_voxels(&self, cell: CellIndex, position: Vec3) -> Vec3 {
-        self.grid.cell_from_scene(cell, position) * self.n as f32
-    }
-
+impl Surveyor<'_, '_> {
     /// What surfaces see of these probes. Of the cells around none of the `moved` probes, what an earlier survey found.
     pub fn survey(&self, placement: &Placement, earlier: Option<(&Survey, &[usize])>) -> Survey {
         let mut stale = vec![earlier.is_none(); self.grid.cell_count()];
@@ -194,8 +75,15 @@ impl<'a, 's> Surveyor<'a, 's> {
             .chunk_by(|a, b| (a.cell, a.voxel_key) == (b.cell, b.voxel_key))
             .filter(|group| stale[group[0].cell.0 as usize])
             .collect();
-        let found: Vec<Found> =
-            groups.into_par_iter().flat_map_iter(|group| looks(self, placement, group).map(|l| l.look())).collect();
+        let looks: Vec<Look> = groups.into_par_iter().flat_map_iter(|group| looks(self, placement, group)).collect();
+        let mut found: Vec<Found> = looks.par_iter().map(|look| look.look(Depth::Glance)).collect();
+        let depths = self.depths(&found);
+        found.par_iter_mut().zip(&looks).zip(depths).for_each(|((found, look), depth)| {
+            if depth != Depth::Glance {
+                let anew = look.look(depth);
+                *found = Found { rays: found.rays + anew.rays, ..anew };
+            }
+        });
         let mut table = SurfaceVisibility { voxels_per_cell: self.n, ..Default::default() };
         let (mut fronts, mut open) = (Vec::new(), Vec::new());
         let mut anew = found.iter().filter(|found| found.asks).peekable();
@@ -218,170 +106,33 @@ impl<'a, 's> Surveyor<'a, 's> {
         table.cell_start.push(table.keys.len() as u32);
         Survey { table, fronts, open, rays: found.iter().map(|found| found.rays).sum() }
     }
-}
 
-/// A look from the surfaces of a voxel that face one way.
-struct Look<'a, 's> {
-    surveyor: &'a Surveyor<'a, 's>,
-    placement: &'a Placement,
-    cell: CellIndex,
-    key: u16,
-    /// By triangle.
-    sides: Vec<Side>,
-}
-
-/// The looks from all surfaces of one voxel, by their keys.
-fn looks<'a, 's>(
-    surveyor: &'a Surveyor<'a, 's>,
-    placement: &'a Placement,
-    met: &'a [Met],
-) -> impl Iterator<Item = Look<'a, 's>> {
-    let Met { cell, voxel_key, .. } = met[0];
-    Facing::ALL.into_iter().filter_map(move |facing| {
-        let side = |m: &Met| {
-            let is_back = m.facing == facing.opposite();
-            (is_back || m.facing == facing).then_some(Side { triangle: TriangleIndex(m.triangle), is_back })
+    /// How closely to look where these were found at a glance, by cell and key: at those that see otherwise than the voxels
+    /// around, and those that are alone.
+    fn depths(&self, found: &[Found]) -> Vec<Depth> {
+        let cells: Vec<&[Found]> = found.chunk_by(|a, b| a.cell == b.cell).collect();
+        let of_cell = |seen: &mut Vec<Option<(u8, bool)>>, of_cell: &&[Found]| -> Vec<Depth> {
+            seen.clear();
+            seen.resize(self.n.pow(3) as usize * 6, None);
+            of_cell.iter().for_each(|found| seen[usize::from(found.key)] = Some((found.mask, found.open.is_some())));
+            of_cell.iter().map(|found| self.depth(found.key, seen)).collect()
         };
-        let sides: Vec<Side> = met.iter().filter_map(side).collect();
-        let key = key(voxel_of_key(voxel_key, surveyor.n), facing, surveyor.n);
-        (!sides.is_empty()).then_some(Look { surveyor, placement, cell, key, sides })
-    })
-}
-
-impl Look<'_, '_> {
-    fn look(&self) -> Found {
-        let Surveyor { grid, world, n, settings, .. } = *self.surveyor;
-        let (cell, key) = (self.cell, self.key);
-        // Backs of surfaces that have only fronts are asked for where nothing else is.
-        let is_outside = |side: &Side| !side.is_back || world.scene.material(side.triangle).double_sided;
-        let is_front = self.sides.iter().any(is_outside);
-        let mut found = Found { cell, key, mask: 0, is_front, open: None, asks: false, rays: 0 };
-        let active = active_corners(grid, &self.placement.states, cell);
-        if active == 0 {
-            return found;
-        }
-        let centre = voxel_of_key(key, n).as_vec3() + 0.5;
-        let piece = |side: &Side| {
-            let corners = self.surveyor.mesh().corners(side.triangle);
-            Piece::new(corners.map(|c| self.surveyor.in_voxels(cell, c) - centre), settings.voxel_margin)
-        };
-        let all = |counts: &dyn Fn(&Side) -> bool, has_area: bool| -> Vec<(&Side, Piece)> {
-            let pieces = self.sides.iter().filter(|side| counts(side)).map(|side| (side, piece(side)));
-            pieces.filter(|(_, piece)| (piece.area > 0.0) == has_area).collect()
-        };
-        // Outsides, backs, and what but touches the voxel: the next only where those before see no probe.
-        for tier in 0..3 {
-            let (pieces, search) = match tier {
-                0 => (all(&is_outside, true), settings.search_points),
-                1 => (all(&|side| !is_outside(side), true), settings.first_points),
-                _ => (all(&|_| true, false), settings.first_points),
-            };
-            found.asks |= tier == 0 && !pieces.is_empty();
-            if pieces.is_empty() {
-                continue;
-            }
-            let tally = self.tally(&pieces, active, search, tier);
-            found.rays += tally.rays;
-            found.open = if tier == 0 { tally.open } else { found.open };
-            if tally.points > 0 {
-                found.mask = tally.majority();
-                break;
-            }
-        }
-        found.asks |= found.mask != 0;
-        found.open = found.open.filter(|_| found.mask == 0);
-        found
+        let depths: Vec<Vec<Depth>> = cells.par_iter().map_init(Vec::new, of_cell).collect();
+        depths.concat()
     }
 
-    /// Rays from points of these pieces, spread evenly over their area. Up to `search` points are tried until one sees any
-    /// probe.
-    fn tally(&self, pieces: &[(&Side, Piece)], active: u8, search: u32, tier: u64) -> Tally {
-        let Surveyor { grid, world, settings, .. } = *self.surveyor;
-        let (cell, key) = (self.cell, self.key);
-        let probes = grid.corners(cell);
-        let area: f32 = pieces.iter().map(|(_, piece)| piece.area).sum();
-        let SurveySettings { first_points, all_points, .. } = *settings;
-        // Several surfaces may see differently.
-        let first = first_points.max((pieces.len() as u32).min(all_points / 2));
-        let mut random = Random::new(0, Purpose::SurfaceVisibility, u64::from(cell.0) << 16 | u64::from(key), tier);
-        let mut points = KroneckerSequence::new(&mut random);
-        let mut tally = Tally::default();
-        for tried in 0.. {
-            let enough = match tally.points {
-                0 => search,
-                _ if tally.agrees() => first,
-                _ => all_points,
-            };
-            let (true, Some([place, x, y, salt])) = (tried < enough, points.next()) else { break };
-            let (side, barycentric) =
-                point(pieces, area * unit_from_bits(place), Vec2::new(unit_from_bits(x), unit_from_bits(y)));
-            let triangle = side.triangle;
-            let corners = &self.surveyor.mesh().corners(triangle);
-            let front = self.surveyor.mesh().geometric_normal(triangle);
-            let position =
-                corners[0] + (corners[1] - corners[0]) * barycentric.x + (corners[2] - corners[0]) * barycentric.y;
-            let normal = if side.is_back { -front } else { front };
-            let facet = Facet { position, normal, offset: ray_offset(corners) };
-            // Where the first points see nothing, the others mostly lie inside a solid: one ray tells.
-            let is_last_hope = tried >= first && tally.points == 0;
-            if is_last_hope {
-                tally.rays += 1;
-                if self.room(&facet, salt).is_none() {
-                    continue;
-                }
-            }
-            let mut seen = 0u8;
-            for (corner, probe) in probes.iter().enumerate().filter(|(corner, _)| active >> corner & 1 == 1) {
-                let probe = probe.0 as usize;
-                let line = sight_line(&facet, self.placement.positions[probe], self.placement.contacts.of(probe));
-                let Some((origin, target)) = line else { continue };
-                tally.rays += 1;
-                // From the surface: most rays that are blocked are blocked near it, where walls and solids meet, and
-                // Embree looks there first.
-                let salt = salt.wrapping_add(corner as u32);
-                seen |= u8::from(!world.tracer.occluded(Ray::segment(origin, target, salt))) << corner;
-            }
-            tally.points += u32::from(seen != 0);
-            if seen == 0 && tally.open.is_none() {
-                tally.rays += 1;
-                let room = self.room(&facet, salt).filter(|room| *room > self.crack());
-                tally.open = room.map(|_| position + normal * self.crack());
-            }
-            (0..8).for_each(|corner| tally.visible[corner] += u32::from(seen >> corner & 1));
-        }
-        tally
-    }
-}
-
-impl Look<'_, '_> {
-    /// How far it is from a point to what it faces, metres. `None` inside of a solid, where that is a back.
-    fn room(&self, facet: &Facet, salt: u32) -> Option<f32> {
-        let origin = facet.position + facet.normal * facet.offset;
-        match self.surveyor.world.surface(Ray::new(origin, facet.normal, salt)) {
-            Some(surface) => (!surface.is_back()).then_some(surface.hit.t),
-            None => Some(f32::INFINITY),
+    /// Of one, by what all of its cell see, by key: a mask, or nothing and whether there is room.
+    fn depth(&self, own: u16, seen: &[Option<(u8, bool)>]) -> Depth {
+        let (voxel, last) = (voxel_of_key(own, self.n), UVec3::splat(self.n - 1));
+        let facing = Facing::ALL[usize::from(own) % 6];
+        let around =
+            block(voxel.saturating_sub(UVec3::ONE), (voxel + 1).min(last)).map(|near| key(near, facing, self.n));
+        let others: Vec<(u8, bool)> =
+            around.filter(|near| *near != own).filter_map(|near| seen[usize::from(near)]).collect();
+        match seen[usize::from(own)] {
+            Some(own) if !others.is_empty() && others.iter().all(|other| *other == own) => Depth::Glance,
+            Some((0, _)) if !others.is_empty() && others.iter().all(|(mask, _)| *mask == 0) => Depth::Room,
+            _ => Depth::Whole,
         }
     }
-
-    /// Metres: what lies this close before a surface leaves no room for anyone who asks, as between tiles and a wall.
-    fn crack(&self) -> f32 {
-        /// Voxels.
-        const CRACK: f32 = 0.5;
-        let Surveyor { grid, n, .. } = *self.surveyor;
-        CRACK * grid.cell_box(self.cell).1.min_element() / n as f32
-    }
-}
-
-/// The side at a place within the pieces' whole area, and barycentric coordinates of a point of it. Pieces without any area
-/// take turns.
-fn point<'p>(pieces: &[(&'p Side, Piece)], place: f32, u: Vec2) -> (&'p Side, Vec2) {
-    let mut left = place;
-    for (side, piece) in pieces {
-        if left < piece.area {
-            return (side, piece.point(left, u));
-        }
-        left -= piece.area;
-    }
-    let (side, piece) = &pieces[(u.x * pieces.len() as f32) as usize % pieces.len()];
-    (side, piece.point(u.y * piece.area, u))
 }

@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::need::far_probes;
 use super::settle::settle_all;
-use super::survey::Surveyor;
+use super::surveyor::Surveyor;
 use super::*;
 use crate::light::World;
 use crate::probe::lattice::grid::{GridSettings, ProbeIndex};
@@ -129,14 +129,15 @@ fn far_probes_are_seen_and_not_too_far() {
     let grid = grid(&scene, 1.5);
     let settings = PlacementSettings::default();
     let placement = placed(&world, &grid, &settings);
-    let table = placement.survey.as_ref().unwrap();
-    assert!(!table.far.is_empty());
+    let survey = Surveyor::new(&world, &grid, 8, &settings.survey).survey(&placement, None);
+    let (table, far) = (&survey.table, far_probes(&world, &grid, &placement, &survey, &settings.survey));
+    assert!(!far.is_empty());
     let mut entry_of = vec![None; table.keys.len()];
     for cell in grid.cells() {
         table.entries(cell).for_each(|entry| entry_of[entry.index] = Some((cell, entry)));
     }
     let mut met = 0;
-    for &(index, probe) in &table.far {
+    for &(index, probe) in &far {
         let (cell, entry) = entry_of[index as usize].unwrap();
         assert_eq!(entry.mask, 0);
         assert_eq!(placement.states[probe as usize], ProbeState::Active);
@@ -151,9 +152,9 @@ fn far_probes_are_seen_and_not_too_far() {
         met += usize::from(offsets.into_iter().any(|o| !blocked(&world, middle + o * voxel * 0.5, position)));
     }
     // The voxel's 27 points need not include the one that the survey found; nearly always they do.
-    assert!(met * 10 >= table.far.len() * 9, "{met} of {}", table.far.len());
+    assert!(met * 10 >= far.len() * 9, "{met} of {}", far.len());
     // The same every time.
-    assert_eq!(far_probes(&world, &grid, &placement, table, &settings.survey), table.far);
+    assert_eq!(far_probes(&world, &grid, &placement, &survey, &settings.survey), far);
 }
 
 /// Surfaces in slits and behind drawers that see no probe get what those see that they see: few are left without an answer,
@@ -168,7 +169,7 @@ fn open_surfaces_that_see_no_probe_are_lent_what_others_see() {
     let task = PlacementTask { grid: &grid, settings: &settings, occlusion: &occlusion, reach: 0.0 };
     let placement = settle_all(&world, &task);
     let mut survey = Surveyor::new(&world, &grid, 12, &settings.survey).survey(&placement, None);
-    survey.table.far = far_probes(&world, &grid, &placement, &survey.table, &settings.survey);
+    survey.table.far = far_probes(&world, &grid, &placement, &survey, &settings.survey);
     let (seen, _) = air::seen(&world, &grid, &placement, &survey.table);
     let own = survey.table.masks.clone();
     let blind = |survey: &super::survey::Survey| {

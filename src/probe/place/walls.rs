@@ -8,7 +8,8 @@ use std::collections::HashMap;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::survey::{Met, Survey, Surveyor};
+use super::survey::Survey;
+use super::surveyor::{Met, Surveyor};
 use crate::probe::lattice::grid::CellIndex;
 use crate::probe::store::regions::{BELOW, BEYOND, MOST_WALLS, Plane, Wall};
 use crate::probe::store::surface::{Entry, Facing, key, voxel_of_key};

@@ -10,7 +10,15 @@
 //! * it goes behind, and nothing is known of what is there: **unknown**, from the texel's beginning on;
 //! * it ends, everything being clear: a **miss**.
 //!
-//! A march over maps of R² texels with a level of M² reads at most [`most_reads`] of them, whatever they hold.
+//! # Most reads
+//!
+//! Whatever the maps hold, a march over R² texels with a level of M² reads at most [`most_reads`]
+//! `= 4·(2⌈M/2⌉ − 1)·2·R/M` of them: less than `8·R` where M is even. The three planes through the probe divide a ray into at
+//! most four parts. Each lies in one quarter of the map, ⌈M/2⌉ texels of the level wide and high. Every step goes to the next
+//! column or to the next row, always in the same two directions, and ends where it would leave the quarter: a quarter of n
+//! columns and n rows is left after at most 2n − 1 texels. Below each of them lie R/M columns and rows, of which the same rule
+//! reads at most 2·R/M − 1; with the one above them these are 2·R/M. Nothing in this depends on how numbers are rounded.
+//! [`super::trace`] has the bound of a whole ray.
 
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
@@ -157,7 +165,8 @@ impl<'a> Maps<'a> {
 
     /// Follows a line over the coarse level.
     fn follow(&self, line: &Line, span: &Span, thickness: &Thickness, watch: &mut impl Watch) -> Option<Step> {
-        let mut cells = Cells::new(line, self.coarse, (0.0, 1.0), [0, 0], self.coarse);
+        let (low, size) = line.quarter(self.coarse);
+        let mut cells = Cells::new(line, self.coarse, (0.0, 1.0), low, size);
         let mut before = span.distance(line.from);
         while let Some(Cell { column, row, to, .. }) = cells.current {
             watch.coarse(column, row);
@@ -221,12 +230,10 @@ impl Span {
     }
 }
 
-/// Most texels that a march reads of maps of `side`² texels with a level of `coarse`². An octant is a triangle with sides of
-/// half the map, a line in it enters at most half as many columns and half as many rows, and one more by rounding at either end.
+/// Most texels that a march reads of maps of `side`² texels with a level of `coarse`²; derived in the module's text.
 pub fn most_reads(side: usize, coarse: usize) -> u64 {
-    let cells = |n: usize| (2 * n.div_ceil(2) + 4) as u64;
-    let below = 2 * (side / coarse) as u64;
-    4 * cells(coarse) * (1 + below)
+    let lines = 2 * coarse.div_ceil(2) - 1;
+    4 * (lines * 2 * (side / coarse)) as u64
 }
 
 /// Distances along a ray between which it stays in one octant around the probe, in ascending order: at most five.
@@ -255,6 +262,8 @@ struct Line {
     /// Both ends in the map, 0 to 1.
     start: Vec2,
     step: Vec2,
+    /// Whether its quarter of the map is the upper half along each axis.
+    upper: [bool; 2],
 }
 
 impl Line {
@@ -276,7 +285,14 @@ impl Line {
             folded * signs.truncate() * 0.5 + 0.5
         };
         let (start, end) = (place(0), place(1));
-        (start.is_finite() && end.is_finite()).then_some(Line { from, to, sizes, start, step: end - start })
+        let upper = [signs.x > 0.0, signs.y > 0.0];
+        (start.is_finite() && end.is_finite()).then_some(Line { from, to, sizes, start, step: end - start, upper })
+    }
+
+    /// The quarter of a map of `side`² texels that the line lies in: its lowest texel, and its sides. Where `side` is odd, the
+    /// texels in the middle belong to all that they meet.
+    fn quarter(&self, side: usize) -> ([usize; 2], usize) {
+        (self.upper.map(|upper| if upper { side / 2 } else { 0 }), side.div_ceil(2))
     }
 
     /// Distance along the ray of a point of the line, 0 to 1. In its plane the map is a projection: a point (1 − u)a + u·b of

@@ -4,8 +4,15 @@
 //! third after it, so that probes far from each other follow one another. When the ray has come to another cell, the nearest
 //! of its probes is next. A ray is lost where none of the eight sees on.
 //!
-//! Distances along a ray grow, and so do cells along each axis: no cell comes twice, and a ray asks at most eight probes in
-//! each.
+//! # Most reads
+//!
+//! Whatever the maps hold, a ray through a grid of cx × cy × cz cells, whose probes have maps of R² texels with a level of M²,
+//! ends within [`most_reads`] `= (cx + cy + cz − 2)·8·4·(2⌈M/2⌉ − 1)·2·R/M` reads. Distances along a ray never fall, and the
+//! sum, product, quotient and rounding that make a cell of them keep their order: along each axis the cell's number only rises
+//! or only falls. Each new cell is at least one further along some axis, so that no more than 1 + Σ(c − 1) come. A cell's
+//! eight probes are asked once each: the step between them is odd. [`super::march`] has the bound of what one of them reads.
+//!
+//! With maps of 1024² and 64² a probe is read 8,064 times at most; rays from surfaces read 47 + 18 in cornell.
 
 use glam::Vec3;
 
@@ -87,6 +94,11 @@ impl<'v> Tracing<'v> {
     /// Farthest that rays go, metres.
     pub fn reach(&self) -> f32 {
         self.reach
+    }
+
+    /// Largest distance of neighbours, metres.
+    pub fn spacing(&self) -> f32 {
+        self.thickness.unit
     }
 
     /// Distance from surfaces at which rays that leave them start, metres: within a texel, what a probe sees lies at one
@@ -192,10 +204,9 @@ impl<'v> Query<'v> {
     }
 }
 
-/// Most texels that a ray reads of a volume with maps of `side`² texels and a level of `coarse`²: so many cells lie along it,
-/// each with eight probes.
+/// Most texels that a ray reads of a volume with maps of `side`² texels and a level of `coarse`²; derived in the module's text.
 pub fn most_reads(volume: &Volume, side: usize, coarse: usize) -> u64 {
-    let cells: u32 = volume.grid.divisions().element_sum();
+    let cells = volume.grid.cells_along().element_sum() - 2;
     u64::from(cells) * CORNERS as u64 * super::march::most_reads(side, coarse)
 }
 

@@ -9,6 +9,7 @@
 //! A light field that rays march through ([`crate::probe::query::march`]) has normals of two bytes and a level of lowest
 //! distances, each the least of the texels below it: `R′²·(4 + 2 + 2) + M²·2` bytes.
 
+mod colors;
 mod levels;
 #[cfg(test)]
 mod tests;
@@ -20,9 +21,10 @@ use half::f16;
 use safetensors::Dtype;
 use serde::{Deserialize, Serialize};
 
+use self::colors::{byte_of, oct_of, read_colors, write_colors};
 pub use self::levels::lowest_of;
 use self::levels::{halved, shrunk};
-use super::encode::{ColorFormat, decode_colors, encode_colors};
+use super::encode::ColorFormat;
 use super::kernel::Kernel;
 use super::map::{OctahedralMaps, fill_with_border, interior_texel};
 use super::prefilter::Prefilter;
@@ -351,15 +353,6 @@ impl Radiance {
     }
 }
 
-/// A coordinate of `oct` in a byte; inverse of [`oct_of`].
-fn byte_of(x: f32) -> u8 {
-    (x.clamp(-1.0, 1.0) * 127.5 + 127.5).round() as u8
-}
-
-fn oct_of(byte: u8) -> f32 {
-    f32::from(byte) / 127.5 - 1.0
-}
-
 /// Texels per side below which light fields have no further levels: 128 and 126 both have five.
 const SMALLEST_LEVEL: usize = 7;
 
@@ -371,50 +364,4 @@ const LOWEST: &str = "lowest_distance";
 
 fn level_name(k: usize) -> String {
     format!("prefiltered.{k}")
-}
-
-fn scale_key(name: &str) -> String {
-    format!("scale.{name}")
-}
-
-fn write_colors(
-    name: &str,
-    maps: &OctahedralMaps<Vec3>,
-    format: ColorFormat,
-    container: &mut Container,
-    losses: &mut EncodingLosses,
-) {
-    let colors = encode_colors(&maps.texels, format);
-    let side = maps.side();
-    let shape = [maps.texels.len() / (side * side), side, side, 3];
-    let shape = if format.is_packed() { &shape[..3] } else { &shape };
-    container.put_bytes(name, format.dtype(), shape, colors.bytes);
-    container.put_json(&scale_key(name), &colors.scale);
-    losses.clamped.insert(name.to_owned(), colors.clamped);
-    losses.underflowed.insert(name.to_owned(), colors.underflowed);
-}
-
-fn read_colors(
-    name: &str,
-    container: &Container,
-    probes: usize,
-    border: usize,
-) -> Result<(OctahedralMaps<Vec3>, ColorFormat), String> {
-    let key = scale_key(name);
-    let scale: f32 = container.json(&key)?;
-    if !(scale > 0.0 && scale.is_finite()) {
-        return Err(format!("metadata '{key}' is {scale}"));
-    }
-    let shape = [Some(probes), None, None, Some(3)];
-    let packed = container.tensors.get(name).is_some_and(|t| t.dtype == Dtype::U32);
-    let tensor = match packed {
-        true => container.tensor(name, &[Dtype::U32], &shape[..3])?,
-        false => container.tensor(name, &[Dtype::F16, Dtype::F32], &shape)?,
-    };
-    let format = ColorFormat::of(tensor.dtype).ok_or_else(|| format!("tensor '{name}' has no colour format"))?;
-    let texels = decode_colors(&tensor.bytes, format, scale);
-    if texels.iter().any(|t| !t.is_finite()) {
-        return Err(format!("tensor '{name}' holds numbers that are not finite"));
-    }
-    Ok((OctahedralMaps { resolution: tensor.map_resolution(name, border)?, border, texels }, format))
 }

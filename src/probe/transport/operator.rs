@@ -232,8 +232,13 @@ impl<C: Captures> Operator<'_, C> {
         for chunk in active.chunks(AT_ONCE) {
             let of_probe = |&p: &usize| {
                 let mask = |i: usize| masks.map(|masks| masks.0[p][i]);
-                self.captures
-                    .with(p, |capture| (self.outgoing(volume, p, capture, mask, emits).0, capture.seen.clone()))
+                self.captures.with(p, |capture| {
+                    let mut radiance = self.outgoing(volume, p, capture, mask, false).0;
+                    if emits {
+                        radiance.iter_mut().zip(capture.shown_radiance()).for_each(|(l, emitted)| *l += emitted);
+                    }
+                    (radiance, capture.seen.clone())
+                })
             };
             let found: Vec<_> = chunk.par_iter().map(of_probe).collect();
             for (&p, (radiance, seen)) in chunk.iter().zip(found) {

@@ -113,7 +113,7 @@ fn keep<C: Captures>(operator: &Operator<C>, volume: &mut Volume, active: &[usiz
         operator.captures.with(p, |capture| {
             let mut radiance: Vec<Vec3A> = total.iter().map(|&l| l.into()).collect();
             if !operator.gathers_emission {
-                radiance.iter_mut().zip(capture.emitted_radiance()).for_each(|(l, emitted)| *l += emitted);
+                radiance.iter_mut().zip(capture.shown_radiance()).for_each(|(l, emitted)| *l += emitted);
             }
             volume.radiance.set(p, &radiance, |o| capture.surface_in(o));
         });

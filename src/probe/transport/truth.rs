@@ -53,6 +53,7 @@ impl Truth {
                 voxels: None,
                 keeps_geometric: false,
                 sees: false,
+                shows: false,
                 resampling: resampling.as_ref(),
                 guide: None,
                 counts: None,

@@ -11,7 +11,7 @@ use super::figures::Seeds;
 use super::rules::{Finding, How};
 use crate::config::messages;
 use crate::report::gate::Gate;
-use crate::system::input::read_file;
+use crate::system::input::read_text;
 
 /// The defaults, and the only place where they and the names of the gates are.
 const DEFAULTS: &str = include_str!("../../../configs/diff.ron");
@@ -68,9 +68,9 @@ impl Thresholds {
     pub fn load(path: Option<&Path>) -> Result<Thresholds, DiffError> {
         let mut thresholds = parse(DEFAULTS, "configs/diff.ron")?;
         if let Some(path) = path {
-            let text = read_file(path).and_then(|bytes| String::from_utf8(bytes).map_err(std::io::Error::other));
             let remedy = "give the path of a RON file such as configs/diff.ron";
-            let text = text.map_err(|cause| DiffError::file(path, format!("cannot be read: {cause}; {remedy}")))?;
+            let text =
+                read_text(path).map_err(|cause| DiffError::file(path, format!("cannot be read: {cause}; {remedy}")))?;
             thresholds.put(&text, &path.display().to_string())?;
         }
         Ok(thresholds)

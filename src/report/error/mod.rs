@@ -51,8 +51,8 @@ const RELATIVE_FLOOR: f64 = 1.0e-2;
 /// two open rooms, the correction left a quarter of the noise's effect.
 const RELATIVE_UNCERTAINTY: f64 = 0.3;
 
-/// Verdict if the noise of the reference exceeds the difference.
-const TOO_NOISY: &str = "reference too noisy";
+/// Verdict if the noise of the reference exceeds the difference: more samples help.
+pub const TOO_NOISY: &str = "reference too noisy";
 
 /// Verdict if the noise of the reference is not known.
 const NOISE_UNKNOWN: &str =

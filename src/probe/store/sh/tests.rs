@@ -3,10 +3,12 @@
 use std::f32::consts::PI;
 
 use glam::{Vec3, Vec3A};
+use safetensors::Dtype;
 
 use super::*;
 use crate::math::fibonacci;
 use crate::math::octahedral::oct_from_direction;
+use crate::probe::container::EncodingLosses;
 use crate::probe::store::{Irradiance, IrradianceStore};
 
 fn store(format: ColorFormat, presampled: Option<usize>) -> IrradianceStore {

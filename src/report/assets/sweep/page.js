@@ -83,7 +83,8 @@
       .filter((point) => point.x > 0 && point.y > 0);
     const figure = document.createElement('figure');
     const caption = document.createElement('figcaption');
-    caption.textContent = title;
+    const zero = data.configurations.filter(({ values }) => values[x] === 0 || values[y] === 0).length;
+    caption.textContent = zero ? `${title} (${zero} at 0 not shown: the axes are logarithmic)` : title;
     figure.append(caption);
     if (!points.length) return figure;
     const svg = make(figure, 'svg', { viewBox: `0 0 ${SIZE.width} ${SIZE.height}`, role: 'group', 'aria-label': title });
@@ -104,7 +105,8 @@
       const curve = points.filter((p) => p.configuration.ladder === ladder).sort((a, b) => a.x - b.x);
       if (curve.length > 1) make(svg, 'path', { class: 'curve', stroke: color(ladder), d: `M${curve.map((p) => `${along.at(p.x)} ${up.at(p.y)}`).join('L')}` });
     });
-    const taken = [];
+    // Boxes of text: left end, baseline, width. No name lies on a mark.
+    const taken = points.map((point) => [along.at(point.x) - 8, up.at(point.y) + 4, 16]);
     for (const point of points) {
       const { configuration, index } = point;
       const [px, py] = [along.at(point.x), up.at(point.y)];

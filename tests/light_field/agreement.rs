@@ -1,31 +1,21 @@
-//! Rays that are traced in probes against the same rays in the scene: how many agree, and what they cost.
-//!
-//! `cargo test --release --test light_field -- --ignored --nocapture` prints the figures of `configs/presets/README.md`;
-//! LIGHTPROBE_MARCH names scenes, each with the points of its grid: `scenes/cornell.glb:5,5,5`.
+//! How many rays agree, and what they cost.
 
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
 
-use glam::{UVec3, Vec2, Vec3};
+use glam::{UVec3, Vec3};
 use lightprobe::light::World;
-use lightprobe::math::octahedral::{oct_from_direction, texel_direction};
 use lightprobe::math::random::{Numbers, Purpose, Random};
 use lightprobe::math::sampling::{cosine_hemisphere, uniform_sphere};
 use lightprobe::probe::Volume;
+use lightprobe::probe::lattice::Grid;
 use lightprobe::probe::lattice::grid::{Bounds, GridSettings};
-use lightprobe::probe::lattice::{Grid, ProbeState};
 use lightprobe::probe::query::march::{Reads, TraceSettings};
 use lightprobe::probe::query::trace::{End, Order, Tracing};
-use lightprobe::probe::store::map::OctahedralMaps;
-use lightprobe::probe::store::radiance::{FAR_M, LightField, Radiance, lowest_of};
-use lightprobe::probe::store::{IrradianceStore, Occlusion};
-use lightprobe::scene::{self, LoadOptions, Scene};
 use lightprobe::trace::Ray;
-use rayon::prelude::*;
 
-/// Texels of the finer maps below one of the coarser.
-const BLOCK: usize = 16;
+use crate::{load, volume};
 
 /// Rays of a scene.
 const RAYS: usize = 20_000;
@@ -34,57 +24,15 @@ const RAYS: usize = 20_000;
 /// or of the distance.
 const APART: f32 = 0.05;
 
-fn load(path: &Path) -> Scene {
-    scene::load(path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
-}
-
-/// Probes with nothing but what rays march through, in the middles of so many equal parts of the scene's box: at its corners,
-/// where grids that cover it begin, they would stand within or behind its walls.
-fn volume(world: &World, divisions: (u32, u32, u32), side: usize) -> Volume {
+/// Points in the middles of so many equal parts of the scene's box: at its corners, where grids that cover it begin, probes would
+/// stand within or behind its walls.
+fn middles(world: &World, divisions: (u32, u32, u32)) -> Grid {
     let (low, high) = world.scene.mesh.bounds().expect("a scene with surfaces");
     let half = 0.5 * (high - low) / UVec3::from(divisions).as_vec3();
     let world_space = |corner: Vec3| (world.scene.origin_world + corner.as_dvec3()).into();
     let bounds = Some(Bounds { min: world_space(low + half), max: world_space(high - half) });
     let settings = GridSettings { bounds, divisions: Some(divisions), ..Default::default() };
-    let grid = Grid::new(&settings, world.scene).unwrap();
-    let positions: Vec<Vec3> = grid.probes().map(|p| grid.grid_point(p)).collect();
-    let texel = |position: Vec3, o: usize| {
-        let direction = texel_direction(o % side, o / side, side);
-        match world.surface(Ray::new(position, direction, 0)) {
-            // As the file holds them: f16, and a normal of two bytes.
-            Some(surface) => {
-                let oct = oct_from_direction(surface.shading_normal) * 127.5 + 127.5;
-                let distance = half::f16::from_f32(surface.hit.t.min(FAR_M)).to_f32();
-                (distance, oct.round() / 127.5 - 1.0)
-            }
-            None => (FAR_M, oct_from_direction(-direction)),
-        }
-    };
-    let of_probe = |position: &Vec3| -> (Vec<f32>, Vec<Vec2>) {
-        (0..side * side).into_par_iter().map(|o| texel(*position, o)).unzip()
-    };
-    let (mut distance, mut normal, mut lowest) = (Vec::new(), Vec::new(), Vec::new());
-    for position in &positions {
-        let (distances, normals) = of_probe(position);
-        lowest.extend(lowest_of(&distances, side, side / BLOCK));
-        distance.extend(distances);
-        normal.extend(normals);
-    }
-    let field = LightField {
-        radiance: OctahedralMaps { resolution: side, border: 0, texels: Vec::new() },
-        normal: OctahedralMaps { resolution: side, border: 0, texels: normal },
-        distance: OctahedralMaps { resolution: side, border: 0, texels: distance },
-        lowest: Some(OctahedralMaps { resolution: side / BLOCK, border: 0, texels: lowest }),
-    };
-    Volume {
-        states: vec![ProbeState::Active; positions.len()],
-        irradiance: IrradianceStore::default().zeros(positions.len(), 1),
-        occlusion: Occlusion::None,
-        radiance: Radiance { light_field: Some(field), ..Default::default() },
-        layout: Default::default(),
-        positions,
-        grid,
-    }
+    Grid::new(&settings, world.scene).unwrap()
 }
 
 /// Rays from surfaces, cosine-distributed, as shading sends them; `clearance` off the surfaces. Surfaces are those that random
@@ -189,7 +137,7 @@ fn measure(world: &World, volume: &Volume, rays: &[(Vec3, Vec3)]) -> Figures {
 fn row(file: &str, divisions: (u32, u32, u32), side: usize) -> Figures {
     let scene = load(Path::new(file));
     let world = World::new(&scene, 1.0, 0.999).unwrap();
-    let volume = volume(&world, divisions, side);
+    let volume = volume(&world, middles(&world, divisions), side);
     let tracing = Tracing::new(&volume, &TraceSettings::default()).unwrap();
     let clearance = std::env::var("LIGHTPROBE_CLEARANCE").ok().and_then(|c| c.parse().ok());
     let clearance = clearance.map_or(tracing.clearance(), |share: f32| share * volume.grid.spacing_max());

@@ -26,6 +26,9 @@ pub struct Grids {
     pub values: Vec<Vec3A>,
 }
 
+/// Share of its light below which a lit point counts as black, as in `leak.black` of reports.
+const BLACK: f64 = 0.05;
+
 /// The most that a probe holds.
 const MOST: usize = harmonics::COUNT;
 
@@ -184,14 +187,29 @@ impl Fitted for Grids {
 
     fn solve(&mut self, rows: Vec<Row>, settings: &RowSettings) -> u32 {
         let (factors, unknowns) = (self.rules.factors(), self.rules.unknowns());
-        let rows = Rows::new(&factors, self.positions.len(), unknowns, rows.into_iter());
+        let mut rows = Rows::new(&factors, self.positions.len(), unknowns, rows.into_iter());
         let lambda = firmness(&rows, &factors, &self.values, settings.lambda);
-        let task = solve::Task { rows: &rows, prior: &self.values, lambda, iterations: settings.iterations };
-        let solved = task.solve(if self.rules.is_signed() { 0 } else { ROUNDS });
+        let (prior, iterations) = (&self.values, settings.iterations);
+        let solve = |rows: &Rows| {
+            let task = solve::Task { rows, prior, lambda: lambda.clone(), iterations };
+            task.solve(if self.rules.is_signed() { 0 } else { ROUNDS })
+        };
+        let mut solved = solve(&rows);
+        let mut iterations = solved.iterations;
+        if self.rules.is_signed() {
+            // Beside a wall with light behind it least squares go below 0, where the shader shows black.
+            for _ in 0..ROUNDS {
+                if rows.weigh_black(&solved.values, BLACK) == 0 {
+                    break;
+                }
+                solved = solve(&rows);
+                iterations += solved.iterations;
+            }
+        }
         let asked = rows.asked();
         for (p, values) in solved.values.chunks(unknowns).enumerate().filter(|(p, _)| asked[*p]) {
             self.set_probe(p, values);
         }
-        solved.iterations
+        iterations
     }
 }

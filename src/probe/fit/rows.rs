@@ -1,7 +1,7 @@
 //! The look-up as a sparse matrix, one row a point: a share for each probe that the point asks, and of each probe the
 //! factors of [`Factors`], which are made anew where they are needed.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec3A};
 use rayon::prelude::*;
 
 use super::points::Asked;
@@ -124,6 +124,21 @@ impl<'f, 'i> Rows<'f, 'i> {
 
     pub fn targets(&self) -> &[Vec3] {
         &self.targets
+    }
+
+    /// Doubles the weight of lit rows to which values give less than a share of their light. Returns how many there are.
+    pub fn weigh_black(&mut self, values: &[Vec3A], share: f64) -> usize {
+        let values: Vec<DVec3> = values.iter().map(|value| value.as_dvec3()).collect();
+        let found = self.times(&values);
+        let mut count = 0;
+        for ((weight, found), target) in self.weights.iter_mut().zip(found).zip(&self.targets) {
+            let light = target.as_dvec3().element_sum();
+            if light > 0.0 && found.element_sum() < share * light {
+                *weight *= 2.0;
+                count += 1;
+            }
+        }
+        count
     }
 
     /// For each probe how noisy its rows are: variance by noise ÷ mean square of what they are beyond the prior without that noise,

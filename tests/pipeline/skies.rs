@@ -141,7 +141,7 @@ fn listings_show_dim_and_bright_light() {
         let told = succeed(&["inspect", text(&baked.path), "--probe", &probe]).stdout;
         let line = told.lines().find(|line| line.contains("irradiance +y")).expect("a line");
         // π times the radiance, but for the rounding of some hundred weights.
-        for figure in line.split_whitespace().skip(2) {
+        for figure in line.split_whitespace().skip(2).take(3) {
             assert!(figure.starts_with("3.14") && figure.ends_with(exponent) && figure.len() < 12, "{line}");
         }
     }

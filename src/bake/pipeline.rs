@@ -57,7 +57,9 @@ impl Prepared<'_, '_> {
         let mut saving = Saving::new(circumstances.checkpoint.as_ref(), identity)?;
         let budget = capture_budget(&self.memory, circumstances);
         let guide = self.pilot(circumstances, budget, &mut saving, &mut log);
-        let capture = Capture { guide: guide.as_ref(), ..self.capture(circumstances) };
+        let expected = log.time(|times| &mut times.capture, || self.expected());
+        let (guide, expected) = (guide.as_ref(), expected.as_ref());
+        let capture = Capture { guide, expected, ..self.capture(circumstances) };
         let (captures, occlusion) = gather(&self, &capture, budget, &mut saving, &mut log);
         // What neither bounces nor shading ask for is only stored. Frames make it as they go, and so ask it.
         let asks = self.plan.visibility || !config.transport.captures_once();

@@ -8,9 +8,10 @@ use super::log::Log;
 use super::memory::Memory;
 use crate::config::{Config, VISIBILITY};
 use crate::light::World;
+use crate::light::expected::Expected;
 use crate::math::random::Purpose;
 use crate::plan::{Looked, Plan, occlusion_bytes};
-use crate::probe::capture::{Capture, CaptureSettings, ProbeCapture, Resampling};
+use crate::probe::capture::{Capture, CaptureSettings, HitLight, ProbeCapture, Resampling};
 use crate::probe::lattice::ProbeState;
 use crate::probe::place::{Placement, PlacementSettings, PlacementTask, place};
 use crate::probe::store::kernel::Kernel;
@@ -92,6 +93,7 @@ impl Prepared<'_, '_> {
             distance_clamp_m: clamp.map(|diagonals| diagonals * self.grid.spacing().length()),
             voxels: self.config.store.occlusion.survey_voxels().map(|voxels| (&self.grid, voxels)),
             hit_light: self.config.transport.hit_light(),
+            expected: None,
             keeps_geometric: self.config.query.needs_geometric(),
             sees: self.config.store.light_field != LightFieldStore::None,
             shows: !self.radiance_store().is_empty(),
@@ -101,6 +103,14 @@ impl Prepared<'_, '_> {
             purpose: Purpose::Capture,
             seed: circumstances.seed,
         }
+    }
+
+    /// What places around the probes are expected to receive; `None` where no paths ask for it.
+    pub(super) fn expected(&self) -> Option<Expected> {
+        let asks = matches!(self.config.transport.hit_light(), HitLight::Paths(_));
+        let probes = self.placement.positions.iter().zip(&self.placement.states);
+        let active = probes.filter(|(_, state)| **state == ProbeState::Active).map(|(position, _)| *position);
+        asks.then(|| self.world.expect_around(&active.collect::<Vec<_>>()))
     }
 
     /// Whether the plan or the configuration keeps what the method knows about occlusion.

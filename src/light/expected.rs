@@ -4,15 +4,21 @@
 //! ([`super::learnt`]). These rays are the links of a small radiosity system (Goral et al. 1984), solved by Jacobi
 //! iteration. It depends on the scene and on the places that it begins with alone. Estimates that use it stay unbiased.
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::World;
+use crate::math::fibonacci;
+use crate::trace::Ray;
 
 /// Links are followed this many times from the places that are asked for. Not varied: a place farther off counts as unknown.
 const GENERATIONS: usize = 4;
 
 /// Bounces: at an albedo of 0.8 the rest is 1 %.
 const BOUNCES: usize = 20;
+
+/// Directions in which a point looks for the places around it.
+const DIRECTIONS: usize = 64;
 
 /// Luminance of the irradiance of places, W·m⁻².
 #[derive(Debug)]
@@ -45,6 +51,15 @@ impl Expected {
 }
 
 impl World<'_> {
+    /// What is expected at the places that are seen from these points, and at those that send them light.
+    pub fn expect_around(&self, points: &[Vec3]) -> Expected {
+        let seen = |&point: &Vec3| {
+            let surface = move |i| self.surface(Ray::new(point, fibonacci::direction(i, DIRECTIONS), 0));
+            (0..DIRECTIONS).filter_map(surface).map(|surface| self.places.key_of(&surface))
+        };
+        self.expect(points.par_iter().flat_map_iter(seen).collect())
+    }
+
     /// What is expected at the places of these keys, and of those that send them light.
     pub fn expect(&self, keys: Vec<usize>) -> Expected {
         let known = self.linked_places(keys);
@@ -90,8 +105,6 @@ mod tests {
 
     use super::*;
     use crate::scene::{self, LoadOptions};
-    use crate::trace::Ray;
-    use glam::Vec3;
 
     #[test]
     fn places_of_a_furnace_expect_its_closed_form() {

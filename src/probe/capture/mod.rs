@@ -9,6 +9,8 @@ pub mod bytes;
 mod captured;
 mod cube;
 pub mod guide;
+mod lit;
+mod pattern;
 mod rays;
 mod settings;
 pub mod surfel;
@@ -17,26 +19,23 @@ mod tests;
 
 use std::f32::consts::TAU;
 
-use glam::{DVec3, Quat, Vec3};
+use glam::{Quat, Vec3};
 
 pub use self::backs::{BackRadiance, Backs};
 pub use self::captured::{ProbeCapture, Seen};
 pub use self::cube::Resampling;
 use self::guide::Guide;
+use self::pattern::{Pattern, TexelRay};
 pub use self::rays::{CubeRays, FibonacciRays, OctahedralRays, Rays};
-use self::rays::{Pattern, TexelRay};
 pub use self::settings::{CaptureSettings, EmissionTransport};
-use self::surfel::{PackedNormal, Surfel};
 use crate::light::World;
 use crate::light::emitters::receiver::Receiver;
-use crate::light::lambert::reflected_radiance;
-use crate::light::path::PathSettings;
+use crate::light::expected::Expected;
 use crate::light::surface::SurfacePoint;
 use crate::math::blocks::{BLOCK, Block};
 use crate::math::random::{KroneckerSequence, Purpose, Random};
 use crate::math::statistics::Moments;
 use crate::probe::lattice::Grid;
-use crate::probe::store::surface::are_in_one_voxel;
 use crate::trace::Ray;
 
 /// How much of the light on a captured hit is found when it is captured.
@@ -57,6 +56,8 @@ pub struct Capture<'w, 's> {
     /// Distances beyond count as this, and so do misses, metres; `None` where no one asks for distances.
     pub distance_clamp_m: Option<f32>,
     pub hit_light: HitLight,
+    /// What places are expected to receive, which paths from hits go by; `None`: unknown.
+    pub expected: Option<&'w Expected>,
     /// The grid that hits look probes up in, and the number of voxels along each axis of its cells, in each of which surfaces
     /// of one facing see the same probes; `None` where no hits are to share a surfel.
     pub voxels: Option<(&'w Grid, u32)>,
@@ -182,11 +183,24 @@ impl Capture<'_, '_> {
                     }
                 }
             }
-            for (ray, surface) in &lit {
+            // Rays through one texel lie beside each other.
+            let mut of_texel = 0;
+            for (i, (ray, surface)) in lit.iter().enumerate() {
+                of_texel = if i > 0 && lit[i - 1].0.texel == ray.texel { of_texel + 1 } else { 0 };
                 match self.hit_light {
                     HitLight::None => {}
                     HitLight::Direct => self.light(ray, surface, surface_samples, &mut random, &mut out),
-                    HitLight::Paths(paths) => self.light_by_paths(index, ray, surface, paths, &mut random, &mut out),
+                    HitLight::Paths(paths) => {
+                        let (tile, place) = layout.tile(ray.texel);
+                        // Paths of a tile's hits share blocks, so that together they cover what single ones leave to chance:
+                        // 0.9 × the variance of a probe's light with one path a hit (veach_ajar), as much with four.
+                        let sample = |path: u32| {
+                            let number = place * paths + path;
+                            let name = of_texel << 48 | u64::from(tile) << 24 | u64::from(number / BLOCK);
+                            Block::new(self.seed, Purpose::ProbePaths, index as u64, name).sample(number % BLOCK)
+                        };
+                        self.light_by_paths((ray, surface), paths, sample, &mut random, &mut out);
+                    }
                 }
             }
         }
@@ -258,100 +272,6 @@ impl Capture<'_, '_> {
         out.emitted.push((ray.texel, radiance * (gathered_share(ray, expected) * ray.share)));
         if self.shows && centre.is_some() {
             out.shown.push((ray.texel, radiance * ray.share));
-        }
-    }
-
-    /// Lights a hit and keeps it.
-    #[inline]
-    fn light(
-        &self,
-        ray: &TexelRay,
-        surface: &SurfacePoint,
-        samples: Option<u32>,
-        random: &mut Random,
-        out: &mut ProbeCapture,
-    ) {
-        let world = self.world;
-        let normal = surface.shading_normal;
-        // Many lights are sampled as emitters.
-        let (punctual, shadow_rays) = match samples {
-            Some(_) if world.emitters.has_lamps() => (Vec3::ZERO, 0),
-            _ => world.punctual_irradiance(surface, normal, random.bits()),
-        };
-        out.rays.shadow += u64::from(shadow_rays);
-        let sampled = match samples {
-            Some(samples) => world.emitter_irradiance(surface, normal, samples, random, &mut out.rays),
-            None => Vec3::ZERO,
-        };
-        let mut direct = reflected_radiance(surface.albedo, out.bounded(punctual + sampled));
-        if !direct.is_finite() {
-            out.non_finite += 1;
-            direct = Vec3::ZERO;
-        }
-        self.keep(surface, direct, ray, random, out);
-    }
-
-    /// Lights a hit with all light there is and keeps it, as a surface that reflects none of the probes' light.
-    fn light_by_paths(
-        &self,
-        probe: usize,
-        ray: &TexelRay,
-        surface: &SurfacePoint,
-        paths: u32,
-        random: &mut Random,
-        out: &mut ProbeCapture,
-    ) {
-        let world = self.world;
-        let normal = surface.shading_normal;
-        let settings = PathSettings::default();
-        let hit = out.surfels.len() as u64;
-        let block = |i: u32| Block::new(self.seed, Purpose::ProbePaths, probe as u64, hit << 32 | u64::from(i / BLOCK));
-        let mut sum = DVec3::ZERO;
-        for i in 0..paths {
-            let mut numbers = block(i).sample(i % BLOCK);
-            let gathered = world.gather(surface, normal, -ray.direction, &settings, &mut numbers, &mut out.rays);
-            if gathered.irradiance.is_finite() {
-                sum += gathered.irradiance.as_dvec3();
-            } else {
-                out.non_finite += 1;
-            }
-        }
-        let (punctual, shadow_rays) = world.punctual_irradiance(surface, normal, block(0).sample(0).salt());
-        out.rays.shadow += u64::from(shadow_rays);
-        let irradiance = punctual + (sum / f64::from(paths.max(1))).as_vec3();
-        let radiance = reflected_radiance(surface.albedo, out.bounded(irradiance));
-        self.keep(&SurfacePoint { albedo: Vec3::ZERO, ..*surface }, radiance, ray, random, out);
-    }
-
-    /// Keeps a hit: as a surfel of its own, or with another ray's of the same texel where both look the same probes up. Bounces
-    /// then ask for the probes' light, which changes little there, less often than rays ask for direct light.
-    #[inline]
-    fn keep(
-        &self,
-        surface: &SurfacePoint,
-        radiance: Vec3,
-        ray: &TexelRay,
-        random: &mut Random,
-        out: &mut ProbeCapture,
-    ) {
-        let surfel = Surfel::new(surface, radiance, ray.texel, ray.share);
-        let of_texel = out.surfels.iter_mut().enumerate().rev().take_while(|(_, known)| known.texel == ray.texel);
-        let asks_alike = |known: &Surfel| {
-            let in_one = |(grid, n)| are_in_one_voxel(grid, n, [known.position, surfel.position]);
-            known.is_like(&surfel) && self.voxels.is_some_and(in_one)
-        };
-        let known = of_texel.into_iter().find(|(_, known)| asks_alike(known));
-        let geometric = || PackedNormal::of(surface.geometric_normal);
-        match known {
-            None => {
-                out.surfels.push(surfel);
-                out.geometric.extend(self.keeps_geometric.then(geometric));
-            }
-            Some((i, known)) => {
-                if known.join(&surfel, random.uniform()) && self.keeps_geometric {
-                    out.geometric[i] = geometric();
-                }
-            }
         }
     }
 

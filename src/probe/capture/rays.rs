@@ -1,14 +1,9 @@
 //! Where a probe's rays go, and the texels that they are kept in.
 
-use std::f32::consts::PI;
-
-use glam::{UVec2, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::cube::{self, CUBE_FACES, Resampling};
 use crate::math::fibonacci;
-use crate::math::octahedral::{direction_and_density, oct_from_direction, solid_angle_density};
-use crate::math::random::{KroneckerSequence, Random, unit_from_bits};
 use crate::probe::store::kernel::Directions;
 
 /// The rays of one probe.
@@ -130,20 +125,6 @@ impl Rays {
             }
             Rays::Cube(CubeRays { resolution: Some(resolution), .. }) => Directions::octahedral(*resolution),
             Rays::Cube(rays) => Directions::lone(cube::texels(rays.face as u32)),
-        }
-    }
-
-    /// The rays of a probe; with `counts` so many through each texel of an octahedral map.
-    pub(super) fn pattern<'c>(&self, counts: Option<&'c [u16]>) -> Pattern<'c> {
-        match self {
-            Rays::Octahedral(rays) => Pattern::Octahedral(Layout {
-                resolution: rays.resolution as u32,
-                per_texel: rays.per_texel.max(1) as u32,
-                centred: rays.centred,
-                counts,
-            }),
-            Rays::Fibonacci(rays) => Pattern::Fibonacci { count: rays.count },
-            Rays::Cube(rays) => Pattern::Cube { face: rays.face as u32 },
         }
     }
 
@@ -276,126 +257,3 @@ const MOST_GUIDED: f32 = 64.0;
 const MOST_FIBONACCI: usize = 1 << 20;
 /// Beyond this exponent a lobe is narrower than the texels of the largest cube.
 const MOST_SHARPNESS: f32 = 1e7;
-
-/// One of the rays through a texel.
-#[derive(Clone, Copy)]
-pub struct TexelRay {
-    pub texel: u32,
-    /// Unit.
-    pub direction: Vec3,
-    /// Rays of the probe per solid angle there, sr⁻¹.
-    pub density: f32,
-    /// Share of the texel's solid angle that the ray stands for, against the texel's other rays.
-    pub share: f32,
-}
-
-/// The rays of one probe before they are traced, row by row.
-pub enum Pattern<'c> {
-    Octahedral(Layout<'c>),
-    Fibonacci { count: usize },
-    Cube { face: u32 },
-}
-
-impl Pattern<'_> {
-    /// Texels that hits fall into before any resampling.
-    pub fn texels(&self) -> usize {
-        match self {
-            Pattern::Octahedral(layout) => (layout.resolution * layout.resolution) as usize,
-            Pattern::Fibonacci { count } => *count,
-            Pattern::Cube { face } => CUBE_FACES * (face * face) as usize,
-        }
-    }
-
-    /// Rows of texels that [`Self::rays`] gives.
-    pub fn rows(&self) -> u32 {
-        match self {
-            Pattern::Octahedral(layout) => layout.rows(),
-            Pattern::Fibonacci { .. } => 1,
-            Pattern::Cube { face } => CUBE_FACES as u32 * face,
-        }
-    }
-
-    /// Rays of a probe per solid angle in a direction, sr⁻¹.
-    pub fn density(&self, direction: Vec3) -> f32 {
-        match self {
-            Pattern::Octahedral(layout) => layout.density(direction),
-            Pattern::Fibonacci { count } => *count as f32 / (4.0 * PI),
-            Pattern::Cube { face } => cube::density(direction, *face),
-        }
-    }
-
-    /// Rays through a row of texels, appended to `rays`.
-    pub fn rays(&self, row: u32, random: &mut Random, rays: &mut Vec<TexelRay>) {
-        let alone =
-            |texel: u32, direction: Vec3| TexelRay { texel, direction, density: self.density(direction), share: 1.0 };
-        match self {
-            Pattern::Octahedral(layout) => layout.rays(row, random, rays),
-            Pattern::Fibonacci { count } => {
-                rays.extend((0..*count).map(|i| alone(i as u32, fibonacci::direction(i, *count))));
-            }
-            Pattern::Cube { face } => {
-                rays.extend((0..*face).map(|x| row * face + x).map(|t| alone(t, cube::direction(t, *face))));
-            }
-        }
-    }
-}
-
-/// How rays are laid out in the octahedral square.
-pub struct Layout<'c> {
-    resolution: u32,
-    /// Rays through every texel, unless `counts` says how many.
-    per_texel: u32,
-    /// Whether lone rays go through texel centres.
-    centred: bool,
-    counts: Option<&'c [u16]>,
-}
-
-impl Layout<'_> {
-    /// Rows of texels that [`Self::rays`] gives.
-    pub fn rows(&self) -> u32 {
-        self.resolution
-    }
-
-    /// Rays through a texel per area of the octahedral square.
-    fn per_area(&self, texel: u32) -> f32 {
-        (self.count(texel) * self.resolution * self.resolution) as f32 / 4.0
-    }
-
-    fn count(&self, texel: u32) -> u32 {
-        self.counts.map_or(self.per_texel, |counts| u32::from(counts[texel as usize]))
-    }
-
-    /// Rays of a probe per solid angle in a direction, sr⁻¹.
-    pub fn density(&self, direction: Vec3) -> f32 {
-        let oct = oct_from_direction(direction);
-        let n = self.resolution;
-        let texel = ((oct + 1.0) * (0.5 * n as f32)).max(Vec2::ZERO).as_uvec2().min(UVec2::splat(n - 1));
-        self.per_area(texel.y * n + texel.x) / solid_angle_density(oct)
-    }
-
-    /// Rays through a row of texels, appended to `rays`: at random within each, several in an even sequence.
-    pub fn rays(&self, row: u32, random: &mut Random, rays: &mut Vec<TexelRay>) {
-        let texel_size = 2.0 / self.resolution as f32;
-        for column in 0..self.resolution {
-            let corner = UVec2::new(column, row).as_vec2() * texel_size - 1.0;
-            let texel = row * self.resolution + column;
-            let per_area = self.per_area(texel);
-            let ray = |place: Vec2| {
-                let (direction, solid_angle) = direction_and_density(corner + place * texel_size);
-                TexelRay { texel, direction, density: per_area / solid_angle, share: 1.0 }
-            };
-            let first = rays.len();
-            match self.count(texel) {
-                1 if self.centred => rays.push(ray(Vec2::splat(0.5))),
-                1 => rays.push(ray(Vec2::new(random.uniform(), random.uniform()))),
-                count => {
-                    let places = KroneckerSequence::new(random).take(count as usize);
-                    rays.extend(places.map(|[x, y, ..]| ray(Vec2::new(unit_from_bits(x), unit_from_bits(y)))));
-                    // Solid angles are the inverse of densities.
-                    let inverse_sum = 1.0 / rays[first..].iter().map(|r| 1.0 / r.density).sum::<f32>();
-                    rays[first..].iter_mut().for_each(|r| r.share = inverse_sum / r.density);
-                }
-            }
-        }
-    }
-}

@@ -4,6 +4,7 @@ use std::f32::consts::PI;
 
 use glam::{Vec3, Vec3A};
 
+use super::surfel::PackedNormal;
 use super::*;
 use crate::math::octahedral::texel_direction;
 use crate::probe::store::kernel::{Directions, Kernel};
@@ -29,6 +30,7 @@ fn capture<'a>(
         settings,
         distance_clamp_m: Some(10.0),
         hit_light,
+        expected: None,
         voxels: None,
         keeps_geometric: true,
         sees: true,

@@ -43,6 +43,7 @@ impl Truth {
         let kernel = volume.irradiance.kernel(&settings.rays.directions());
         let lobes = volume.irradiance.lobes();
         let contacts = Contacts::of_points(world.scene, &volume.positions);
+        let expected = world.expect_around(&volume.active().map(|p| volume.positions[p]).collect::<Vec<_>>());
         let bar = progress.stage("path-traced probes", RUNS as usize * volume.active_count());
         let run = |run: u64| -> Vec<Vec<Vec3A>> {
             let capture = Capture {
@@ -50,6 +51,7 @@ impl Truth {
                 settings,
                 distance_clamp_m: None,
                 hit_light: HitLight::Paths(paths),
+                expected: Some(&expected),
                 voxels: None,
                 keeps_geometric: false,
                 sees: false,

@@ -68,7 +68,8 @@ def scaled_maps(preset, texels):
             f"store.occlusion.moments.resolution={texels}",
         ]
     of_preset = {
-        "irradiance-2022": ["store.prefiltered=[]"],
+        # Bytes that gloss would take from irradiance.
+        "irradiance-2022": ["store.prefiltered=[]", "query.glossy=none"],
         "lightfield-2022": [f"store.occlusion.moments.resolution={texels}", "store.layout.published=None"],
     }
     return [

@@ -209,7 +209,7 @@ def bytes_(scene):
                 grid = ["grid.spacing_m=None", f"grid.divisions={fitted_divisions(extent(scene), probes)}"]
             entries.append(ladder(scene, "bytes", name, preset, [*settings, *grid]))
             double = at_spacing(2 * own)
-            if count(scene, preset, double) <= probes:
+            if count(scene, preset, [*settings, *double]) <= probes:
                 entries.append(ladder(scene, "bytes", f"{name}, spacing × 2", preset, [*settings, *double]))
     return entries
 

@@ -104,6 +104,7 @@ fn filter_and_bounce(criterion: &mut Criterion) {
         settings: &config.capture,
         distance_clamp_m: None,
         hit_light: config.transport.hit_light(),
+        expected: None,
         voxels: None,
         keeps_geometric: false,
         sees: false,

@@ -17,7 +17,8 @@ const GENERATIONS: usize = 4;
 /// Bounces: at an albedo of 0.8 the rest is 1 %.
 const BOUNCES: usize = 20;
 
-/// Directions in which a point looks for the places around it.
+/// Directions in which a point looks for the places around it. Not varied: a place that none of them meets, and that no link
+/// leads to, counts as unknown.
 const DIRECTIONS: usize = 64;
 
 /// Luminance of the irradiance of places, W·m⁻².

@@ -7,11 +7,13 @@ use rayon::prelude::*;
 use super::circumstances::Circumstances;
 use super::gather::CHUNK;
 use super::prepared::Prepared;
+use crate::probe::capture::Capture;
 
 impl Prepared<'_, '_> {
     /// Rays per second of bare Embree over the rays of the capture, in its order.
     pub fn raw_rays_per_s(&self, circumstances: &Circumstances) -> Option<f64> {
-        let capture = self.capture(circumstances);
+        let expected = self.expected();
+        let capture = Capture { expected: expected.as_ref(), ..self.capture(circumstances) };
         let active = self.active();
         let bar = circumstances.progress.stage("raw rays", active.len());
         let (mut rays, mut seconds) = (0usize, 0.0);

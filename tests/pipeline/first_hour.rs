@@ -5,7 +5,9 @@ use std::io::{BufRead, BufReader, Read};
 use std::process::{Command, Stdio};
 
 use crate::common::{Folder, Gltf};
-use crate::program::{bake, command, finish, method, names_in, refuse, render, run, scene, succeed, text};
+use crate::program::{
+    bake, command, finish, interruptible, method, names_in, refuse, render, run, scene, succeed, text,
+};
 use crate::shapes::{add, add_light, diffuse, quad, room, save};
 use serde_json::json;
 
@@ -237,7 +239,7 @@ fn an_interruption_says_what_is_left() {
     // Work for minutes, and -v says when it has begun.
     let arguments =
         ["bake", text(&scene("office")), "-o", text(&output), "-v", "--set", "grid.spacing_m=0.2"].map(str::to_owned);
-    let mut child = command().args(arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut child = interruptible().args(arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     let mut lines = BufReader::new(child.stderr.take().unwrap());
     let mut line = String::new();
     while !line.starts_with("acceleration structure") {

@@ -9,7 +9,7 @@ use nix::unistd::Pid;
 use serde_json::Value;
 
 use crate::common::Folder;
-use crate::program::{command, finish, names_in, one_error, run, scene, succeed, text};
+use crate::program::{command, finish, interruptible, names_in, one_error, run, scene, succeed, text};
 
 const SET: [&str; 6] = ["--set", "grid.spacing_m=1", "--set", "fit.rows.rows_per_probe=40", "--threads", "2"];
 
@@ -50,7 +50,7 @@ impl Bake {
 
     fn start(&self, more: &[&str]) -> Child {
         let output = self.output();
-        let mut command = command();
+        let mut command = interruptible();
         command.args(self.arguments(&output, more)).stdout(Stdio::null()).stderr(Stdio::piped());
         command.spawn().unwrap()
     }
@@ -155,7 +155,7 @@ fn interruptions_say_what_is_left() {
         assert!(bake.take() == whole, "{signal}: the file is another");
     }
     let unsaved = bake.folder.path().join("b.probes");
-    let mut child = command();
+    let mut child = interruptible();
     child.args([
         "bake",
         text(&bake.scene),

@@ -27,6 +27,14 @@ pub fn command() -> Command {
     Command::new(env!("CARGO_BIN_EXE_lightprobe"))
 }
 
+/// The same with the signals that a terminal gives it. Shells have what runs in the background ignore Ctrl-C, and whatever that
+/// starts, the tests too.
+pub fn interruptible() -> Command {
+    let mut env = Command::new("env");
+    env.args(["--default-signal=INT,TERM,HUP", env!("CARGO_BIN_EXE_lightprobe")]);
+    env
+}
+
 /// Runs it to its end, however it ends.
 pub fn run<S: AsRef<OsStr>>(arguments: &[S]) -> Run {
     finish(command().args(arguments))

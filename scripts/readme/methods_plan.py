@@ -26,7 +26,8 @@ SCENES = {
     "cornell": {"spacing": 0.25, "curve": [1.0, 0.7, 0.5, 0.35, 0.25, 0.18]},
     "courtyard": {"spacing": 2.0, "curve": [8.0, 5.6, 4.0, 2.8, 2.0, 1.4]},
     "office": {"spacing": 1.0, "mixed": 0.35},
-    "glossy_room": {"spacing": 0.75, "glossy": True},
+    # Published resolutions would take more than 70 minutes of a core.
+    "glossy_room": {"spacing": 0.4, "glossy": True, "maps": 64},
     "veach_ajar": {"file": f"{SHARED}/scenes/veach_ajar/veach_ajar.glb", "spacing": 0.7},
     "bathroom": {
         "file": f"{SHARED}/scenes/bathroom/LAZIENKA.gltf",
@@ -37,10 +38,6 @@ SCENES = {
         "glossy": True,
     },
 }
-
-# Where a method at its published resolution would need more than 60 GB or 20 minutes of a core: settings instead.
-# (scene, part, preset): settings. Rows made with them are called scaled.
-SCALED = {}
 
 # The same in every scene and part: 8 MiB a probe are 2 to 18 GB on these grids. Maps of 128² are as large as those of the others.
 MARCH = ["capture.rays.octahedral.resolution=128", "store.light_field=march(lowest: 8)"]
@@ -57,6 +54,10 @@ GLOSS = [
 
 # What methods of more than 8 KiB a probe are scaled to where bytes are compared: texels along a side of all their maps.
 MAPS = (16, 32, 64)
+
+# On equal positions they have this many. FULL=1: as many as published but where a scene says otherwise, and mcguire-2017 those of
+# MARCH; two cores then take four hours more.
+QUICK = None if os.environ.get("FULL") else 64
 
 
 def scaled_maps(preset, texels):
@@ -140,11 +141,10 @@ def figure(configuration, key):
 
 def ladder(scene, part, name, preset, settings, axes=""):
     always = [] if "scaled" in name else ALWAYS_SCALED.get(preset, [])
-    scaled = [*always, *SCALED.get((scene, part, preset), [])]
-    quoted = ", ".join(json.dumps(text) for text in [*settings, *scaled])
+    quoted = ", ".join(json.dumps(text) for text in [*settings, *always])
     config = config_of(scene)
     config = f'config: "{os.path.relpath(config, WORK / scene / part)}", ' if config else ""
-    name += ", scaled" if scaled else ""
+    name += ", scaled" if always else ""
     return f'        (name: "{name}", preset: "{preset}", {config}set: [{quoted}]{axes}),\n'
 
 
@@ -154,8 +154,18 @@ def at_spacing(spacing):
 
 def positions(scene):
     own = at_spacing(spacing_of(scene))
-    entries = [ladder(scene, "positions", preset, preset, own) for preset in PRESETS]
-    if SCENES[scene].get("glossy"):
+    glossy, maps = SCENES[scene].get("glossy"), SCENES[scene].get("maps") or QUICK
+    entries = []
+    for preset in PRESETS:
+        if maps and preset in LARGE:
+            settings = scaled_maps(preset, maps)
+            if glossy and preset == "irradiance-2022":
+                levels = [maps >> i for i in range(5)]
+                settings += [f"store.prefiltered={levels}", "query.glossy=prefiltered(parallax: volume)"]
+            entries.append(ladder(scene, "positions", f"{preset}, scaled to {maps}²", preset, [*own, *settings]))
+        else:
+            entries.append(ladder(scene, "positions", preset, preset, own))
+    if glossy:
         entries += [ladder(scene, "positions", f"{name}, with gloss", name, [*own, *GLOSS]) for name in PRESETS[:2]]
     return entries
 

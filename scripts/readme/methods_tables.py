@@ -143,7 +143,7 @@ def short_table(scenes):
             first = pair[0]["configurations"]
             row = next((row for row in first if row["label"].split(",")[0] == preset), None)
             for key, ratios in costs.items():
-                if row:
+                if row and typical(row, key) is not None:
                     ratios.append(typical(row, key) / typical(first[0], key))
         cells += ["–" if mean is None else f"{significant(mean)} ×" for mean in map(geometric_mean, costs.values())]
         rows.append(cells)

@@ -15,7 +15,7 @@ import sys
 
 sys.dont_write_bytecode = True
 
-from methods_plan import PARTS, ROOT, SCENES, WORK, file_of, prepare  # noqa: E402
+from methods_plan import NOTHING, PARTS, ROOT, SCENES, WORK, file_of, prepare  # noqa: E402
 from methods_judged import ablation_table, judged_table, offsets_table  # noqa: E402
 from methods_rooms import rooms_table  # noqa: E402
 from methods_tables import at_budgets, full_tables, markdown, mixed_table, short_table  # noqa: E402
@@ -82,7 +82,10 @@ def publish():
         else:
             print(f"{source.relative_to(ROOT)} is not there: {target.name} stays as it is", file=sys.stderr)
     for name, text in sections(list(SCENES)):
-        put(ROOT / "configs" / "presets" / "README.md", name, text)
+        if text == NOTHING:
+            print(f"{name}: nothing was run; its table stays as it is", file=sys.stderr)
+        else:
+            put(ROOT / "configs" / "presets" / "README.md", name, text)
 
 
 def known(scene):

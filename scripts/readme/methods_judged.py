@@ -1,6 +1,6 @@
 """Tables that judge the default: against all others at twice its bytes and on equal positions, on shifted grids, and without
 each of its ingredients."""
-from methods_plan import figure, sweep_of, typical
+from methods_plan import NOTHING, figure, sweep_of, typical
 from methods_tables import geometric_mean, markdown, percent, significant, size
 
 OURS = ("default", "physical")
@@ -67,7 +67,7 @@ def judged_table(scenes):
         cells.append(times(gloss[-1]))
         lines.append(cells)
     if not lines:
-        return "Nothing was run."
+        return NOTHING
     means = [times(geometric_mean(column)) for column in [*columns, leaks, gloss]]
     lines.append(["geometric mean", "", "", "", "", "", *means])
     head = ["scene", "bytes", "error", "best published at twice the bytes", "bytes", "error"]
@@ -88,7 +88,7 @@ def offsets_table(scenes):
             cells = [scene if row is report["configurations"][0] else "", f"`{row['label']}`", size(typical(row, "bytes"))]
             lines.append([*cells, percent(typical(row, "error_relative")), span, percent(typical(row, "leak_light"))])
     head = ["scene", "method", "bytes", "error, geometric mean", "from to", "leak light"]
-    return markdown(head, lines) if lines else "Nothing was run."
+    return markdown(head, lines) if lines else NOTHING
 
 
 ABLATED = [
@@ -121,4 +121,4 @@ def ablation_table(scenes):
         cells.append(percent(sum(black) / len(black)))
         lines.append(cells)
     head = ["change", *(name for name, _ in ABLATED), "black in air"]
-    return markdown(head, lines) if lines else "Nothing was run."
+    return markdown(head, lines) if lines else NOTHING

@@ -12,6 +12,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 WORK = ROOT / "out" / "methods"
 SHARED = os.environ.get("SHARED", "../shared")
 
+# In place of a table whose part was not run.
+NOTHING = "Nothing was run."
+
 PRESETS = ["physical", "default", "irradiance-2022", "lightfield-2022", "mcguire-2017", "ddgi-2019"]
 PRESETS += ["threev8-uniform", "threev8-mixed"]
 # More than 8 KiB a probe: ladders end at the scene's own spacing, beyond which a bake takes hours of a core.
@@ -26,7 +29,7 @@ SCENES = {
     "cornell": {"spacing": 0.25, "curve": [1.0, 0.7, 0.5, 0.35, 0.25, 0.18]},
     "courtyard": {"spacing": 2.0, "curve": [8.0, 5.6, 4.0, 2.8, 2.0, 1.4]},
     "office": {"spacing": 1.0, "mixed": 0.35},
-    # Published resolutions would take more than 70 minutes of a core.
+    # At published resolutions the two methods of cubes would take two hours of a core.
     "glossy_room": {"spacing": 0.4, "glossy": True, "maps": 64},
     "veach_ajar": {"file": f"{SHARED}/scenes/veach_ajar/veach_ajar.glb", "spacing": 0.7},
     "bathroom": {
@@ -39,7 +42,7 @@ SCENES = {
     },
 }
 
-# The same in every scene and part: 8 MiB a probe are 2 to 18 GB on these grids. Maps of 128² are as large as those of the others.
+# The same in every scene and part: 8 MiB a probe are 2 to 20 GB on these grids. Maps of 128² are as large as those of the others.
 MARCH = ["capture.rays.octahedral.resolution=128", "store.light_field=march(lowest: 8)"]
 MARCH += ["store.irradiance.octahedral.resolution=32", "store.occlusion.moments.resolution=32"]
 ALWAYS_SCALED = {"mcguire-2017": MARCH}
@@ -60,7 +63,7 @@ MAPS = (16, 32, 64)
 QUICK = None if os.environ.get("FULL") else 64
 
 
-def scaled_maps(preset, texels):
+def scaled_maps(preset, texels, glossy=False):
     if preset == "mcguire-2017":
         return [
             f"capture.rays.octahedral.resolution={texels}",
@@ -69,8 +72,10 @@ def scaled_maps(preset, texels):
             f"store.occlusion.moments.resolution={texels}",
         ]
     of_preset = {
-        # Bytes that gloss would take from irradiance.
-        "irradiance-2022": ["store.prefiltered=[]", "query.glossy=none"],
+        # Where bytes are compared, those that gloss would take from irradiance.
+        "irradiance-2022": [f"store.prefiltered={[texels >> i for i in range(5)]}"]
+        if glossy
+        else ["store.prefiltered=[]", "query.glossy=none"],
         "lightfield-2022": [f"store.occlusion.moments.resolution={texels}", "store.layout.published=None"],
     }
     return [
@@ -158,11 +163,8 @@ def positions(scene):
     entries = []
     for preset in PRESETS:
         if maps and preset in LARGE:
-            settings = scaled_maps(preset, maps)
-            if glossy and preset == "irradiance-2022":
-                levels = [maps >> i for i in range(5)]
-                settings += [f"store.prefiltered={levels}", "query.glossy=prefiltered(parallax: volume)"]
-            entries.append(ladder(scene, "positions", f"{preset}, scaled to {maps}²", preset, [*own, *settings]))
+            settings = [*own, *scaled_maps(preset, maps, glossy)]
+            entries.append(ladder(scene, "positions", f"{preset}, scaled to {maps}²", preset, settings))
         else:
             entries.append(ladder(scene, "positions", preset, preset, own))
     if glossy:

@@ -1,7 +1,7 @@
 """The table of two_rooms.sh: two rooms with 16 probes each, beside what is published."""
 import math
 
-from methods_plan import PRESETS, WORK, read_json
+from methods_plan import NOTHING, PRESETS, WORK, read_json
 from methods_tables import markdown, milliseconds, percent, significant, size
 
 ROOMS = ["two_rooms_sealed", "two_rooms_open"]
@@ -65,7 +65,7 @@ def rooms_table():
             threads = "one thread" if count == 1 else f"{count} threads" if count else "one machine"
             blocks.append(f"**{scene}**, 4 × 2 × 2 probes; times of {threads}.\n\n{markdown(head, lines)}")
     if not blocks:
-        return "Nothing was run."
+        return NOTHING
     return "\n\n".join(blocks + ["\n".join(findings(found))])
 
 

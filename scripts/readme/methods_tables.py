@@ -2,7 +2,7 @@
 import math
 import os
 
-from methods_plan import PRESETS, SCENES, WORK, figure, sweep_of, typical
+from methods_plan import NOTHING, PRESETS, SCENES, WORK, figure, sweep_of, typical
 
 
 def significant(value, digits=3):
@@ -115,7 +115,7 @@ def full_tables(part, scenes):
         report = sweep_of(scene, part)
         if report is not None:
             blocks.append(f"**{scene}**. {caption(scene, report)}\n\n{full_table(report, part)}")
-    return "\n\n".join(blocks) if blocks else "Nothing was run."
+    return "\n\n".join(blocks) if blocks else NOTHING
 
 
 def geometric_mean(values):
@@ -173,7 +173,7 @@ def mixed_table(scenes):
         finest = os.environ.get("SPACING") or SCENES[scene]["mixed"]
         lead = f"**{scene}**, finest spacing {finest} m, cube faces of 32² (scaled). {caption(scene, report)}"
         blocks.append(f"{lead}\n\n{markdown(head, lines)}")
-    return "\n\n".join(blocks) if blocks else "Nothing was run."
+    return "\n\n".join(blocks) if blocks else NOTHING
 
 
 def at_budgets(scenes):
@@ -195,4 +195,4 @@ def at_budgets(scenes):
                 rows.append([size(budget["bytes"]), *marked])
         head = ["bytes in all", *(f"`{entry['method']}`" for entry in budgets[0]["entries"])]
         blocks.append(f"**{scene}**. {caption(scene, report)}\n\n{markdown(head, rows)}")
-    return "\n\n".join(blocks) if blocks else "Nothing was run."
+    return "\n\n".join(blocks) if blocks else NOTHING

@@ -11,7 +11,7 @@ use crate::math::random::{KroneckerSequence, Purpose, Random, unit_from_bits};
 use crate::math::sampling::cosine_hemisphere;
 use crate::probe::lattice::Grid;
 use crate::probe::lattice::grid::CellIndex;
-use crate::probe::store::regions::air_places;
+use crate::probe::store::regions::{CellAir, air_places};
 use crate::probe::store::surface::{Entry, Facing, SurfaceVisibility, key, voxel_of};
 use crate::trace::Ray;
 
@@ -32,14 +32,14 @@ struct Blind {
 }
 
 /// Gives entries that see no probe, neither of their cell nor around it, the mask of the nearest place in the air that they see,
-/// or else of a surface. What sees only such as see nothing stays dark: a sealed box without a probe. `seen` is what the
-/// [`air_places`] of each cell see. Returns the rays that told.
-pub fn lend(world: &World, grid: &Grid, survey: &mut Survey, seen: &[Vec<u8>]) -> u64 {
+/// or else of a surface. What sees only such as see nothing stays dark: a sealed box without a probe. `seen` is what the air
+/// of each cell sees. Returns the rays that told.
+pub fn lend(world: &World, grid: &Grid, survey: &mut Survey, seen: &[CellAir]) -> u64 {
     let table = &survey.table;
     let cells: Vec<(CellIndex, Vec<Blind>)> = grid.cells().map(|cell| (cell, blind_entries(survey, cell))).collect();
     let mut cells: Vec<_> = cells.into_iter().filter(|(_, blind)| !blind.is_empty()).collect();
     let of_air = |(cell, blind): &mut (CellIndex, Vec<Blind>)| {
-        let seen = &seen[cell.0 as usize];
+        let seen = &seen[cell.0 as usize].masks;
         let (low, sides) = grid.cell_box(*cell);
         let places: Vec<Vec3> =
             air_places(table.voxels_per_cell).take(seen.len()).map(|place| low + place * sides).collect();

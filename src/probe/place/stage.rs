@@ -36,8 +36,9 @@ pub fn place(world: &World, task: &PlacementTask, surveying: impl FnOnce()) -> P
     if occlusion.keeps_survey() {
         found.table.far = need::far_probes(world, grid, &placement, &found, &settings.survey);
         leave_unseen(&world.scene.mesh, grid, &mut placement, &found.table, settings.keep_unsampled);
-        let (seen, rays) = air::seen(world, grid, &placement, &found.table);
+        let (mut seen, rays) = air::seen(world, grid, &placement, &found.table);
         placement.rays += rays + lend(world, grid, &mut found, &seen);
+        placement.rays += air::look_beside_dark(world, grid, &placement, &found, &mut seen);
         placement.regions = Some(Regions::new(grid, &found.table, &found.ranks(), &seen, &walls(&surveyor, &found)));
     }
     placement.survey = Some(found.table);

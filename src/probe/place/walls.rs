@@ -167,12 +167,12 @@ impl OfCell<'_, '_> {
         self.survey.table.entries(self.cell()).map(side).collect()
     }
 
-    /// From where to where along an axis the surfaces of each entry lie, voxels, by key. Backs have no say: they are asked for
-    /// where nothing else is.
+    /// From where to where along an axis the surfaces of each entry lie, voxels, by key. Backs have a say where no front lies: there
+    /// the entry is theirs.
     fn extents(&self, axis: usize) -> HashMap<u16, (f32, f32)> {
         let (mesh, n) = (self.surveyor.mesh(), self.surveyor.n);
         let margin = self.surveyor.settings.voxel_margin;
-        let mut extents: HashMap<u16, (f32, f32)> = HashMap::new();
+        let (mut extents, mut backs): (HashMap<u16, (f32, f32)>, HashMap<u16, (f32, f32)>) = Default::default();
         for met in self.met {
             let triangle = TriangleIndex(met.triangle);
             let voxel = voxel_of_key(met.voxel_key, n);
@@ -180,15 +180,15 @@ impl OfCell<'_, '_> {
             let (low, high) = (voxel[axis] as f32 - margin, (voxel[axis] + 1) as f32 + margin);
             let extent = places.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), p| (a.min(*p), b.max(*p)));
             let (low, high) = (extent.0.clamp(low, high), extent.1.clamp(low, high));
-            let mut grow = |facing: Facing| {
+            let grow = |extents: &mut HashMap<u16, (f32, f32)>, facing: Facing| {
                 let known = extents.entry(key(voxel, facing, n)).or_insert((low, high));
                 *known = (known.0.min(low), known.1.max(high));
             };
-            grow(met.facing);
-            if self.surveyor.world.scene.material(triangle).double_sided {
-                grow(met.facing.opposite());
-            }
+            grow(&mut extents, met.facing);
+            let has_back = !self.surveyor.world.scene.material(triangle).double_sided;
+            grow(if has_back { &mut backs } else { &mut extents }, met.facing.opposite());
         }
-        extents
+        backs.extend(extents);
+        backs
     }
 }

@@ -23,7 +23,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 use safetensors::Dtype;
 
-pub use self::grow::{BELOW, BEYOND, Rank, Wall, air_places};
+pub use self::grow::{BELOW, BEYOND, CellAir, Rank, Wall, air_places, middle};
 use self::words::{FACINGS, FAR, LEAF, LOW, Part, WALLS, distance, length, number, plane_of};
 pub use self::words::{MOST_WALLS, Plane};
 use super::surface::{Facing, MAX_VOXELS_PER_CELL, Seen, SurfaceVisibility, voxel_of};
@@ -39,16 +39,17 @@ pub struct Regions {
 }
 
 impl Regions {
-    /// The trees of a table. Entries answer as they do there, according to their `ranks`. The air answers about as `air` says: what
-    /// the [`air_places`] of each cell see, or nothing where that is not known. `walls` are those of each cell, or none.
+    /// The trees of a table. Entries answer as they do there, according to their `ranks`. The air answers about as `air` says of each
+    /// cell, if anything. `walls` are those of each cell, or none.
     pub fn new(
         grid: &Grid,
         table: &SurfaceVisibility,
         ranks: &[Rank],
-        air: &[Vec<u8>],
+        air: &[CellAir],
         walls: &[Vec<Wall>],
     ) -> Regions {
-        let air = |cell: u32| air.get(cell as usize).map_or(&[][..], Vec::as_slice);
+        let unknown = CellAir::default();
+        let air = |cell: u32| air.get(cell as usize).unwrap_or(&unknown);
         let walls = |cell: u32| walls.get(cell as usize).map_or(&[][..], Vec::as_slice);
         let trees: Vec<Vec<u16>> = (0..grid.cell_count() as u32)
             .into_par_iter()

@@ -3,7 +3,7 @@
 
 use glam::{UVec3, Vec3};
 
-use super::super::surface::{Entry, Facing, SurfaceVisibility, voxel_of};
+use super::super::surface::{Entry, Facing, SurfaceVisibility, voxel_of, voxel_of_key};
 use super::words::{AXIS_SHIFT, FAR, LEAF, LOW, NUMBER, Plane, THRESHOLD_SHIFT, words_of};
 use crate::probe::lattice::grid::CellIndex;
 
@@ -67,10 +67,32 @@ const BLACK: u32 = 32;
 
 /// Places in the air of a cell, in shares of its sides, x fastest.
 pub fn air_places(voxels_per_cell: u32) -> impl Iterator<Item = Vec3> {
-    /// Shares of the way from one place to the next: a little off the planes of round numbers that walls like.
-    const SHIFT: f32 = 0.01;
     let n = MOST_PLACES.min(voxels_per_cell);
-    (0..n.pow(3)).map(move |i| (UVec3::new(i % n, i / n % n, i / (n * n)).as_vec3() + 0.5 + SHIFT) / n as f32)
+    (0..n.pow(3)).map(move |i| middle(UVec3::new(i % n, i / n % n, i / (n * n)), n))
+}
+
+/// The middle of one of n³ equal parts of a cell, in shares of its sides: a little off the planes of round numbers that walls like.
+pub fn middle(part: UVec3, n: u32) -> Vec3 {
+    /// Shares of a part's side.
+    const SHIFT: f32 = 0.01;
+    (part.as_vec3() + 0.5 + SHIFT) / n as f32
+}
+
+/// What is seen from the air of a cell.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct CellAir {
+    /// At the [`air_places`]; empty where that is not known.
+    pub masks: Vec<u8>,
+    /// In the middle of further voxels, none of which has such a place, by key with [`Facing::ALL`]'s first facing.
+    pub further: Vec<(u16, u8)>,
+}
+
+impl CellAir {
+    /// Places that see any probe, with what they see.
+    fn places(&self, n: u32) -> impl Iterator<Item = (Vec3, u8)> {
+        let further = self.further.iter().map(move |&(key, mask)| (middle(voxel_of_key(key, n), n), mask));
+        air_places(n).zip(self.masks.iter().copied()).chain(further).filter(|(_, mask)| *mask != 0)
+    }
 }
 
 /// Buffers that cells share.
@@ -82,13 +104,13 @@ pub struct Grower {
 }
 
 impl Grower {
-    /// A cell's tree. `ranks` are those of all entries; `air` is what each of the cell's [`air_places`] sees, or empty.
+    /// A cell's tree. `ranks` are those of all entries.
     pub fn tree(
         &mut self,
         table: &SurfaceVisibility,
         cell: CellIndex,
         ranks: &[Rank],
-        air: &[u8],
+        air: &CellAir,
         walls: &[Wall],
     ) -> Vec<u16> {
         let mut words = Vec::new();
@@ -114,7 +136,7 @@ impl Grower {
             self.add(entry.voxel, facing, answer, rank == Rank::Own, sides_of(own));
         }
         // Who sees none of the eight is inside of something, or cannot be helped.
-        for (place, &mask) in air_places(n).zip(air).filter(|(_, mask)| **mask != 0) {
+        for (place, mask) in air.places(n) {
             let voxel = voxel_of(place, n);
             for facing in Facing::ALL {
                 let side = |wall: &Wall| if wall.plane.is_below(place, facing) { BELOW } else { BEYOND };

@@ -56,7 +56,7 @@ fn entries_answer_as_in_the_table() {
         let mut random = Random::new(seed, Purpose::FitPoints, 1, 0);
         // Whatever the air sees.
         let air: Vec<u8> = air_places(n).map(|_| random.bits() as u8).collect();
-        let regions = Regions::new(&grid, &table, &open(&table), &[air], &[]);
+        let regions = Regions::new(&grid, &table, &open(&table), &[CellAir { masks: air, ..CellAir::default() }], &[]);
         let mut asked = 0;
         for entry in table.entries(CellIndex(0)) {
             for _ in 0..8 {
@@ -114,7 +114,7 @@ fn the_air_answers_as_it_sees_up_to_the_surfaces() {
     let table = SurfaceVisibility { voxels_per_cell: n, cell_start: vec![0, 64, 64], keys, masks, far: Vec::new() };
     let seen = |place: Vec3| if place.y < 0.5 { 0x33 } else { 0xff };
     let (grid, air) = (grid(), air_places(n).map(seen).collect());
-    let regions = Regions::new(&grid, &table, &open(&table), &[air], &[]);
+    let regions = Regions::new(&grid, &table, &open(&table), &[CellAir { masks: air, ..CellAir::default() }], &[]);
     let ask = |at: [f32; 3], facing: Vec3| {
         let at = Vec3::from(at);
         regions.look_up(&grid, &grid.cell(at), at, Facing::of(facing)).mask
@@ -131,7 +131,7 @@ fn the_air_answers_as_it_sees_up_to_the_surfaces() {
     let rank = |mask: &u8| if *mask == 0 { Rank::Buried } else { Rank::Own };
     let buried: Vec<Rank> = table.masks.iter().map(rank).collect();
     let air = air_places(n).map(seen).collect();
-    let without = Regions::new(&grid, &table, &buried, &[air], &[]);
+    let without = Regions::new(&grid, &table, &buried, &[CellAir { masks: air, ..CellAir::default() }], &[]);
     let at = Vec3::new(3.5, 0.5, 3.5) / 8.0;
     assert_eq!(without.look_up(&grid, &grid.cell(at), at, Facing::of(Vec3::Y)).mask, 0x33);
     assert!(without.parts() < regions.parts());
@@ -152,7 +152,7 @@ fn where_the_air_sees_otherwise_than_a_surface_it_does_so_up_to_that_surface() {
         };
         let seen = |place: Vec3| if place.x * 8.0 < wall as f32 { 0x55 } else { 0xaa };
         let (grid, air) = (grid(), air_places(n).map(seen).collect());
-        let regions = Regions::new(&grid, &table, &open(&table), &[air], &[]);
+        let regions = Regions::new(&grid, &table, &open(&table), &[CellAir { masks: air, ..CellAir::default() }], &[]);
         for x in 0..n {
             let at = Vec3::new((x as f32 + 0.5) / 8.0, 0.4, 0.4);
             let expected = if x < wall && wall > 1 { 0x55 } else { 0xaa };
@@ -263,7 +263,7 @@ fn things_beside_a_thin_wall_see_what_is_on_their_side() {
     let air = air_places(n).map(|place| if place.x < 0.3 { low } else { high }).collect();
     let sides = entries.iter().map(|(_, mask)| if *mask == low { BELOW } else { BEYOND }).collect();
     let wall = Wall { plane: Plane { axis: 0, place: (0.3f32 * 65536.0) as u16 }, sides };
-    let regions = Regions::new(&grid, &table, &open(&table), &[air], &[vec![wall]]);
+    let regions = Regions::new(&grid, &table, &open(&table), &[CellAir { masks: air, ..CellAir::default() }], &[vec![wall]]);
     let (origin, sides) = grid.cell_box(CellIndex(0));
     let seen = |x: f32, facing: Facing| {
         let at = origin + Vec3::new(x, 0.4, 0.6) * sides;
@@ -311,7 +311,7 @@ fn walls_change_nothing_for_surfaces() {
         }
         let air = air_places(n).map(|_| 1 + (random.bits() % 255) as u8).collect();
         let plain = whole(&table);
-        let regions = Regions::new(&grid, &table, &open(&table), &[air], &[walls]);
+        let regions = Regions::new(&grid, &table, &open(&table), &[CellAir { masks: air, ..CellAir::default() }], &[walls]);
         divided += usize::from(regions != plain);
         let (low, sides) = grid.cell_box(CellIndex(0));
         for entry in table.entries(CellIndex(0)) {

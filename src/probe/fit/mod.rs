@@ -132,7 +132,7 @@ pub fn fit_rows(volume: &mut Volume, rows: impl Iterator<Item = Row>, settings: 
     let unknowns = volume.irradiance.fitted_unknowns();
     let rows = Rows::new(&factors, volume.states.len(), unknowns, rows);
     let prior: Vec<Vec3A> = (0..volume.states.len()).flat_map(|p| volume.irradiance.fitted(p)).collect();
-    let lambda = firmness(&rows, &factors, &prior, settings.lambda);
+    let lambda = firmness(&rows, &factors, &prior, settings.firmness());
     let task = solve::Task { rows: &rows, prior: &prior, lambda, iterations: settings.iterations };
     // Irradiance is nowhere negative. Coefficients have signs, but for the mean of all directions.
     let solved = match volume.irradiance.signed() {
@@ -202,10 +202,8 @@ pub fn traced(fit: &Fit, active: usize) -> (f64, u32) {
         Fit::None => (0.0, 0),
         Fit::Rows(settings) => {
             let points: usize = settings.points(active).iter().sum();
-            (
-                points as f64 * (1.0 + 1.0 / points::HELD_OUT as f64),
-                settings.paths.midpoint(settings.most_paths.max(settings.paths)),
-            )
+            let [least, most] = settings.paths();
+            (points as f64 * (1.0 + 1.0 / points::HELD_OUT as f64), least.midpoint(most))
         }
     }
 }

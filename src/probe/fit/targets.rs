@@ -77,20 +77,20 @@ pub fn trace(
     let expected = world.expect(on_surface.map(|asked| world.places.key_of(&asked.surface)).collect());
     let path = PathSettings { expected: Some(&expected), ..PathSettings::default() };
     let tracer = Tracer { world, path: &path, seed };
-    let [least, most] = settings.paths();
+    let least = |index: usize| settings.paths(asked[index].kind)[0];
     let mut tallies = vec![Tally::default(); asked.len()];
     let first = |index: usize, tally: &mut Tally| {
         if index.is_multiple_of(STEP) {
             advance(STEP as u64);
         }
-        tracer.add(&asked[index], index, 0..least, tally);
+        tracer.add(&asked[index], index, 0..least(index), tally);
     };
     in_blocks(&mut tallies, 0, traced, first);
-    let times = times(world, asked, &tallies, most / least);
+    let times = times(world, asked, &tallies, settings);
     let more = |index: usize, tally: &mut Tally| {
         if asked[index].kind != Kind::Air {
             let times = times.get(&world.places.key_of(&asked[index].surface)).copied().unwrap_or(1);
-            tracer.add(&asked[index], index, least..times * least, tally);
+            tracer.add(&asked[index], index, least(index)..times * least(index), tally);
         }
     };
     in_blocks(&mut tallies, 1, traced, more);
@@ -121,9 +121,11 @@ fn in_blocks(tallies: &mut [Tally], pass: u32, traced: &mut impl Traced, add: im
 
 /// How many times as many paths the points of places need. They decide together, so that what one finds by chance is not what it
 /// is weighed by.
-fn times(world: &World, asked: &[Asked], tallies: &[Tally], most: u32) -> HashMap<usize, u32> {
+fn times(world: &World, asked: &[Asked], tallies: &[Tally], settings: &RowSettings) -> HashMap<usize, u32> {
+    let [least, most] = settings.paths(Kind::Surface);
     let mut places: HashMap<usize, (f64, f64)> = HashMap::new();
-    for (asked, tally) in asked.iter().zip(tallies).filter(|(asked, tally)| asked.kind != Kind::Air && tally.count > 0)
+    for (asked, tally) in
+        asked.iter().zip(tallies).filter(|(asked, tally)| asked.kind == Kind::Surface && tally.count > 0)
     {
         let target = tally.target();
         let (noise, light) = places.entry(world.places.key_of(&asked.surface)).or_default();
@@ -132,7 +134,7 @@ fn times(world: &World, asked: &[Asked], tallies: &[Tally], most: u32) -> HashMa
     }
     let times = |(noise, light): (f64, f64)| {
         let wanted = NOISE * (light - noise).max(0.0);
-        if noise > wanted { (noise / wanted).ceil().min(f64::from(most)) as u32 } else { 1 }
+        if noise > wanted { (noise / wanted).ceil().min(f64::from(most / least)) as u32 } else { 1 }
     };
     places.into_iter().map(|(key, sums)| (key, times(sums))).collect()
 }

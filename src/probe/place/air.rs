@@ -99,9 +99,8 @@ pub fn look_beside_dark(
 ) -> u64 {
     let (table, ranks) = (&survey.table, survey.ranks());
     let (n, last) = (table.voxels_per_cell, UVec3::splat(table.voxels_per_cell - 1));
-    let is_dark = |entry: &Entry| {
-        entry.mask == 0 && ranks[entry.index] == Rank::Own && table.far_probe(entry.index).is_none()
-    };
+    let is_dark =
+        |entry: &Entry| entry.mask == 0 && ranks[entry.index] == Rank::Own && table.far_probe(entry.index).is_none();
     // These voxels have been asked.
     let known: Vec<UVec3> = air_places(n).map(|place| voxel_of(place, n)).collect();
     let of_cell = |(cell, air): (usize, &mut CellAir)| {

@@ -263,7 +263,8 @@ fn things_beside_a_thin_wall_see_what_is_on_their_side() {
     let air = air_places(n).map(|place| if place.x < 0.3 { low } else { high }).collect();
     let sides = entries.iter().map(|(_, mask)| if *mask == low { BELOW } else { BEYOND }).collect();
     let wall = Wall { plane: Plane { axis: 0, place: (0.3f32 * 65536.0) as u16 }, sides };
-    let regions = Regions::new(&grid, &table, &open(&table), &[CellAir { masks: air, ..CellAir::default() }], &[vec![wall]]);
+    let regions =
+        Regions::new(&grid, &table, &open(&table), &[CellAir { masks: air, ..CellAir::default() }], &[vec![wall]]);
     let (origin, sides) = grid.cell_box(CellIndex(0));
     let seen = |x: f32, facing: Facing| {
         let at = origin + Vec3::new(x, 0.4, 0.6) * sides;
@@ -311,7 +312,8 @@ fn walls_change_nothing_for_surfaces() {
         }
         let air = air_places(n).map(|_| 1 + (random.bits() % 255) as u8).collect();
         let plain = whole(&table);
-        let regions = Regions::new(&grid, &table, &open(&table), &[CellAir { masks: air, ..CellAir::default() }], &[walls]);
+        let regions =
+            Regions::new(&grid, &table, &open(&table), &[CellAir { masks: air, ..CellAir::default() }], &[walls]);
         divided += usize::from(regions != plain);
         let (low, sides) = grid.cell_box(CellIndex(0));
         for entry in table.entries(CellIndex(0)) {

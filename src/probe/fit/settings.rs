@@ -71,6 +71,11 @@ impl RowSettings {
         self.lambda * self.rows_per_probe as f32 / USUAL_ROWS as f32
     }
 
+    /// How many times fewer rows there are than usually; 1 where there are as many or more.
+    pub fn scarcity(&self) -> f32 {
+        (USUAL_ROWS as f32 / self.rows_per_probe as f32).max(1.0)
+    }
+
     /// Paths from each point of a kind of row, least and most.
     ///
     /// The fewer rows there are the more each of them counts, noise and all. With 19 rows errors in pictures of six scenes are 1.01
@@ -85,8 +90,8 @@ impl RowSettings {
             Kind::Bent => self.bent.min(1.0),
             Kind::Air => self.air.min(1.0),
         };
-        let share = weight * (USUAL_ROWS as f32 / self.rows_per_probe as f32).max(1.0);
-        let of_row = |paths: u32| ((paths as f32 * share).ceil() as u32).max(LEAST.min(paths));
+        let times = weight * self.scarcity();
+        let of_row = |paths: u32| ((paths as f32 * times).ceil() as u32).max(LEAST.min(paths));
         [of_row(self.paths), of_row(self.most_paths.max(self.paths))]
     }
 

@@ -36,7 +36,8 @@ impl Target {
 /// the air in two_rooms_open, thin_wall and office are 1.03 to 1.05 and 1.06 to 1.1 times as large.
 const BRIGHTEST: f64 = 0.002;
 
-/// Variance that the points of a place, that is of a cell and a facing, are to be left with, as a share of the square of their light.
+/// Variance that the points of a place, that is of a cell and a facing, are to be left with, as a share of the square of their light;
+/// less where rows are scarce.
 /// Where there is more, noise shows as blotches. Beside 16 paths from every point, at the same time: errors of two_rooms_open,
 /// thin_wall and cornell 4 to 5 % larger, of its dark side, courtyard, veach_ajar and bathroom 2 to 5 % smaller, and the dim wall of
 /// veach_ajar is smoother. With 0.02 and up to 48 paths 3 to 7 % smaller errors, for 1.2 times the time.
@@ -133,7 +134,7 @@ fn times(world: &World, asked: &[Asked], tallies: &[Tally], settings: &RowSettin
         *light += f64::from(target.runs[0].length_squared()) / 3.0;
     }
     let times = |(noise, light): (f64, f64)| {
-        let wanted = NOISE * (light - noise).max(0.0);
+        let wanted = NOISE / f64::from(settings.scarcity()) * (light - noise).max(0.0);
         if noise > wanted { (noise / wanted).ceil().min(f64::from(most / least)) as u32 } else { 1 }
     };
     places.into_iter().map(|(key, sums)| (key, times(sums))).collect()

@@ -32,6 +32,36 @@ pub fn relative(found: &[Vec3], truth: &[BlockMean]) -> Option<(f64, f64)> {
     Some((error, root_error(error, (spread / (points.len() as f64 - 1.0).max(1.0)).sqrt())))
 }
 
+/// The fewest points that hold half of the squared error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Concentration {
+    pub points: usize,
+    /// The one that holds most of it.
+    pub worst: usize,
+    /// Light at the worst ÷ the mean.
+    pub times_mean: f64,
+}
+
+/// Where the squared error is. `None` without an error, and without light.
+pub fn concentration(found: &[Vec3], truth: &[BlockMean]) -> Option<Concentration> {
+    let square = |i: usize| {
+        let difference = found[i].as_dvec3() - truth[i].mean;
+        (difference * difference - truth[i].variance()).element_sum().max(0.0)
+    };
+    let mut squares: Vec<(usize, f64)> = (0..found.len()).map(|i| (i, square(i))).collect();
+    squares.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let half = 0.5 * squares.iter().map(|(_, square)| square).sum::<f64>();
+    let light = |i: usize| f64::from(luminance(truth[i].mean.as_vec3()));
+    let mean = (0..truth.len()).map(light).collect::<Moments>().mean();
+    let worst = squares.first().map(|(worst, _)| *worst).filter(|_| half > 0.0 && mean > 0.0)?;
+    let mut held = 0.0;
+    let before = squares.iter().take_while(|(_, square)| {
+        held += square;
+        held < half
+    });
+    Some(Concentration { points: before.count() + 1, worst, times_mean: light(worst) / mean })
+}
+
 /// RMSE of all channels between two bakes at these points ÷ the mean luminance of the truth. `None` without light.
 pub fn relative_difference(a: &[Vec3], b: &[Vec3], truth: &[BlockMean]) -> Option<f64> {
     let square = |(a, b): (&Vec3, &Vec3)| (a.as_dvec3() - b.as_dvec3()).length_squared() / 3.0;
@@ -67,6 +97,21 @@ mod tests {
         let exact = vec![Vec3::splat(2.0); 100];
         let difference = relative_difference(&found, &exact, &[truth(&[2.0, 2.0]); 100]).unwrap();
         assert!((difference - error).abs() < 1e-6, "{difference}");
+    }
+
+    /// Squares of 9, 4 and eighteen times 0.25 are 17.5, half of it 8.75.
+    #[test]
+    fn half_of_the_squared_error_may_be_that_of_few_points() {
+        let mut found = vec![Vec3::splat(1.5); 20];
+        let mut truths = [truth(&[1.0, 1.0]); 20];
+        found[7] = Vec3::splat(4.0);
+        found[3] = Vec3::splat(3.0);
+        assert_eq!(concentration(&found, &truths), Some(Concentration { points: 1, worst: 7, times_mean: 1.0 }));
+        // Squares of 4 and eighteen times 0.25: half of 8.5 are the first and another.
+        truths[7] = truth(&[4.0, 4.0]);
+        let Concentration { points, worst, .. } = concentration(&found, &truths).unwrap();
+        assert_eq!((points, worst), (2, 3));
+        assert_eq!(concentration(&[Vec3::ONE; 20], &[truth(&[1.0, 1.0]); 20]), None);
     }
 
     /// Blocks of 1 and 3: a variance of 1 of their mean 2, which is all the difference from 3 there is.

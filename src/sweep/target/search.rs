@@ -137,11 +137,13 @@ impl Search<'_, '_> {
         };
         let next = self.next(&steps, &kept, noise);
         let (error, standard_error) = (kept.report.error, kept.report.standard_error);
+        let met = measured(&kept.report).is_some_and(|step| step.meets(self.error));
+        let few = if met { None } else { self.few_points(&kept, &held_out) };
         let report = TargetReport {
             error: self.error,
             reached: error,
             standard_error,
-            met: measured(&kept.report).is_some_and(|step| step.meets(self.error)),
+            met,
             seen: self.seen(&kept)?,
             points: held_out.points.len(),
             paths: held_out.paths(),
@@ -150,11 +152,27 @@ impl Search<'_, '_> {
             steps: reports,
             noise,
             stopped_because: stop.because,
-            message: stop.message,
+            message: [Some(stop.message), few].into_iter().flatten().collect::<Vec<_>>().join("; "),
             next,
             time_s: started.elapsed().as_secs_f64(),
         };
         Ok(Found { config: kept.config, baked: kept.baked, report })
+    }
+
+    /// Where the error is, in words, if few points hold it: beside a small lamp, say, which no grid resolves.
+    fn few_points(&self, kept: &Judged, held_out: &HeldOut) -> Option<String> {
+        /// Share of the points that are few.
+        const FEW: f64 = 1e-3;
+        let of = held_out.points.len();
+        let few = sampled::concentration(&kept.found, &held_out.truth)?;
+        let (_, point) = held_out.points.get(few.worst).filter(|_| few.points as f64 <= FEW * of as f64)?;
+        let [x, y, z] = (self.world.scene.origin_world + point.position.as_dvec3()).to_array();
+        let times = format::significant(few.times_mean, 2);
+        Some(format!(
+            "half of the squared error is that of {} of {of} points, most of it at ({x:.2}, {y:.2}, {z:.2}) with {times} times \
+             the mean light",
+            few.points
+        ))
     }
 
     fn config(&self, choice: Choice) -> Config {

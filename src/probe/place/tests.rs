@@ -9,11 +9,12 @@ use super::settle::settle_all;
 use super::surveyor::Surveyor;
 use super::*;
 use crate::light::World;
+use crate::math::random::{Purpose, Random};
 use crate::probe::lattice::grid::{GridSettings, ProbeIndex};
 use crate::probe::lattice::{Grid, ProbeState};
 use crate::probe::store::OcclusionStore;
 use crate::probe::store::regions::Rank;
-use crate::probe::store::surface::SurfaceVisibility;
+use crate::probe::store::surface::{Facing, SurfaceStore, SurfaceVisibility};
 use crate::scene::{self, LoadOptions, Scene};
 use crate::trace::Ray;
 
@@ -235,6 +236,30 @@ fn a_survey_is_renewed_where_probes_moved() {
     assert_eq!(renewed.fronts, anew.fronts);
     assert!(renewed.table != before.table, "nothing changed");
     assert!(renewed.rays * 4 < anew.rays, "{} {}", renewed.rays, anew.rays);
+}
+
+/// A sheet that has only a front stands at x = 1. What is before it sees the probes on its own side, though the sheet's other side,
+/// which faces the same way in the same voxel, sees those beyond.
+#[test]
+fn things_beside_a_sheet_see_the_probes_on_their_side() {
+    let scene = scene("thin_wall");
+    let world = World::new(&scene, 1.0, 0.999).unwrap();
+    let grid = grid(&scene, 0.75);
+    let occlusion = OcclusionStore::Surface(SurfaceStore { voxels_per_cell: 12 });
+    let settings = PlacementSettings { keep_unsampled: true, ..Default::default() };
+    let task = PlacementTask { grid: &grid, settings: &settings, occlusion: &occlusion, reach: 0.0 };
+    let regions = place(&world, &task, || {}).regions.unwrap();
+    let mut random = Random::new(1, Purpose::FitPoints, 0, 0);
+    for x in [0.945, 0.97, 0.99, 1.01, 1.03, 1.055] {
+        let own = if x < 1.0 { 0x55 } else { 0xaa };
+        for _ in 0..200 {
+            let at = Vec3::new(x, 0.5 + 2.0 * random.uniform(), -1.5 + 3.0 * random.uniform())
+                - scene.origin_world.as_vec3();
+            let mask = |normal| regions.look_up(&grid, &grid.cell(at), at, Facing::of(normal)).mask;
+            let seen = [mask(Vec3::X), mask(Vec3::NEG_X)];
+            assert!(seen.iter().all(|mask| mask & own != 0 && mask & !own == 0), "{x} {at}: {seen:?}");
+        }
+    }
 }
 
 #[test]

@@ -127,6 +127,16 @@ fn the_air_answers_as_it_sees_up_to_the_surfaces() {
     assert_eq!(ask([3.9 / 8.0, 0.9 / 8.0, 3.5 / 8.0], Vec3::Y), 0);
     assert_eq!(ask([4.1 / 8.0, 0.5 / 8.0, 3.5 / 8.0], Vec3::Y), 0x33);
     assert_eq!(ask([3.5 / 8.0, 1.1 / 8.0, 3.5 / 8.0], Vec3::Y), 0x33);
+    // What is beside the blind surface is asked too, and not left as dark.
+    let further = [[3, 0, 3], [4, 1, 3]].map(|voxel| (key(UVec3::from(voxel), Facing::ALL[0], n), 0x0f)).to_vec();
+    let air = CellAir { masks: air_places(n).map(seen).collect(), further };
+    let beside = Regions::new(&grid, &table, &open(&table), &[air], &[]);
+    let ask = |x: f32, y: f32, facing: Vec3| {
+        let at = Vec3::new(x, y, 3.5) / 8.0;
+        beside.look_up(&grid, &grid.cell(at), at, Facing::of(facing)).mask
+    };
+    assert_eq!((ask(3.5, 0.5, Vec3::Y), ask(3.5, 0.5, Vec3::X)), (0, 0x0f));
+    assert_ne!(ask(4.5, 1.5, Vec3::Y), 0);
     // Inside of a solid it is none at all.
     let rank = |mask: &u8| if *mask == 0 { Rank::Buried } else { Rank::Own };
     let buried: Vec<Rank> = table.masks.iter().map(rank).collect();

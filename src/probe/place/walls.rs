@@ -34,6 +34,9 @@ struct Face {
     voxels: Vec<u16>,
 }
 
+/// From where to where the surfaces of entries lie along an axis, voxels, by key.
+type Extents = HashMap<u16, (f32, f32)>;
+
 /// The walls of every cell.
 pub fn walls(surveyor: &Surveyor, survey: &Survey) -> Vec<Vec<Wall>> {
     let mut walls = vec![Vec::new(); surveyor.grid.cell_count()];
@@ -169,10 +172,10 @@ impl OfCell<'_, '_> {
 
     /// From where to where along an axis the surfaces of each entry lie, voxels, by key. Backs have a say where no front lies: there
     /// the entry is theirs.
-    fn extents(&self, axis: usize) -> HashMap<u16, (f32, f32)> {
+    fn extents(&self, axis: usize) -> Extents {
         let (mesh, n) = (self.surveyor.mesh(), self.surveyor.n);
         let margin = self.surveyor.settings.voxel_margin;
-        let (mut extents, mut backs): (HashMap<u16, (f32, f32)>, HashMap<u16, (f32, f32)>) = Default::default();
+        let (mut extents, mut backs) = (Extents::new(), Extents::new());
         for met in self.met {
             let triangle = TriangleIndex(met.triangle);
             let voxel = voxel_of_key(met.voxel_key, n);
@@ -180,7 +183,7 @@ impl OfCell<'_, '_> {
             let (low, high) = (voxel[axis] as f32 - margin, (voxel[axis] + 1) as f32 + margin);
             let extent = places.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), p| (a.min(*p), b.max(*p)));
             let (low, high) = (extent.0.clamp(low, high), extent.1.clamp(low, high));
-            let grow = |extents: &mut HashMap<u16, (f32, f32)>, facing: Facing| {
+            let grow = |extents: &mut Extents, facing: Facing| {
                 let known = extents.entry(key(voxel, facing, n)).or_insert((low, high));
                 *known = (known.0.min(low), known.1.max(high));
             };

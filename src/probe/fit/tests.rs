@@ -330,9 +330,9 @@ fn held_out_points_of_each_kind_have_figures_of_their_own() {
 fn scarce_rows_have_more_paths_and_light_ones_fewer() {
     // 75/19 = 3.95 times as many where there are 19.
     for (rows_per_probe, paths, lambda) in [
-        (75, [[4, 32], [2, 16], [2, 4]], 0.03),
-        (150, [[4, 32], [2, 16], [2, 4]], 0.06),
-        (19, [[16, 127], [8, 64], [2, 13]], 0.0076),
+        (75, [[4, 32], [4, 16], [4, 4]], 0.03),
+        (150, [[4, 32], [4, 16], [4, 4]], 0.06),
+        (19, [[16, 127], [16, 64], [16, 16]], 0.0076),
     ] {
         let settings = RowSettings { rows_per_probe, ..RowSettings::default() };
         assert_eq!([Kind::Surface, Kind::Bent, Kind::Air].map(|kind| settings.paths(kind)), paths);

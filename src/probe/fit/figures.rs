@@ -4,7 +4,8 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::points::{Asked, Kind};
+use super::points::Asked;
+use super::settings::Kind;
 use super::targets::Target;
 use crate::light::sampled::RayCount;
 use crate::probe::query::Answers;

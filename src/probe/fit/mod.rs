@@ -26,7 +26,7 @@ use rayon::prelude::*;
 pub use self::figures::FitFigures;
 use self::points::Asked;
 use self::rows::{Row, Rows};
-pub use self::settings::{Fit, RowSettings};
+pub use self::settings::{Fit, Kind, RowSettings};
 pub use self::targets::Traced;
 use crate::light::World;
 use crate::probe::Volume;
@@ -202,7 +202,7 @@ pub fn traced(fit: &Fit, active: usize) -> (f64, u32) {
         Fit::None => (0.0, 0),
         Fit::Rows(settings) => {
             let points: usize = settings.points(active).iter().sum();
-            let [least, most] = settings.paths(points::Kind::Surface);
+            let [least, most] = settings.paths(Kind::Surface);
             (points as f64 * (1.0 + 1.0 / points::HELD_OUT as f64), least.midpoint(most))
         }
     }

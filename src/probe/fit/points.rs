@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::settings::RowSettings;
+use super::settings::{Kind, RowSettings};
 use crate::light::World;
 use crate::light::contact::{Contacts, Facet, sight_line};
 use crate::light::sides::{Place, Sides};
@@ -15,18 +15,6 @@ use crate::probe::place::air;
 use crate::probe::query::{Answers, CornerWeights, QueryPoint, Visibility};
 use crate::probe::store::surface::Facing;
 use crate::trace::Ray;
-
-/// Which of three kinds a point is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// On a surface, with its shading normal.
-    Surface,
-    /// On a surface, with a normal beside its own, as normal maps have them. Without these only the few directions are right
-    /// that walls ask for.
-    Bent,
-    /// In free air, with any normal.
-    Air,
-}
 
 /// A point that asks.
 #[derive(Debug, Clone, Copy)]

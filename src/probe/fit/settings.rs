@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::points::Kind;
 use crate::probe::query::QuerySettings;
 use crate::probe::store::IrradianceStore;
 
@@ -15,6 +14,18 @@ pub enum Fit {
     None,
     /// Those by which look-ups come nearest to path-traced light at points of surfaces and of the air.
     Rows(RowSettings),
+}
+
+/// Which of three kinds a point is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// On a surface, with its shading normal.
+    Surface,
+    /// On a surface, with a normal beside its own, as normal maps have them. Without these only the few directions are right
+    /// that walls ask for.
+    Bent,
+    /// In free air, with any normal.
+    Air,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -6,8 +6,8 @@ use std::ops::Range;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::points::{Asked, Kind};
-use super::settings::RowSettings;
+use super::points::Asked;
+use super::settings::{Kind, RowSettings};
 use crate::light::World;
 use crate::light::path::PathSettings;
 use crate::light::sampled::RayCount;

@@ -7,7 +7,7 @@ use std::f32::consts::PI;
 use glam::{DVec3, UVec3, Vec2, Vec3, Vec3A};
 use nalgebra::{DMatrix, DVector};
 
-use super::points::{Kind, asked_in_air};
+use super::points::asked_in_air;
 use super::*;
 use crate::math::random::{Purpose, Random};
 use crate::math::sampling::uniform_sphere;

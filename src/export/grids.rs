@@ -188,7 +188,7 @@ impl Fitted for Grids {
     fn solve(&mut self, rows: Vec<Row>, settings: &RowSettings) -> u32 {
         let (factors, unknowns) = (self.rules.factors(), self.rules.unknowns());
         let mut rows = Rows::new(&factors, self.positions.len(), unknowns, rows.into_iter());
-        let lambda = firmness(&rows, &factors, &self.values, settings.firmness());
+        let lambda = firmness(&rows, &factors, &self.values, settings.lambda);
         let (prior, iterations) = (&self.values, settings.iterations);
         let solve = |rows: &Rows| {
             let task = solve::Task { rows, prior, lambda: lambda.clone(), iterations };

@@ -132,7 +132,7 @@ pub fn fit_rows(volume: &mut Volume, rows: impl Iterator<Item = Row>, settings: 
     let unknowns = volume.irradiance.fitted_unknowns();
     let rows = Rows::new(&factors, volume.states.len(), unknowns, rows);
     let prior: Vec<Vec3A> = (0..volume.states.len()).flat_map(|p| volume.irradiance.fitted(p)).collect();
-    let lambda = firmness(&rows, &factors, &prior, settings.firmness());
+    let lambda = firmness(&rows, &factors, &prior, settings.lambda);
     let task = solve::Task { rows: &rows, prior: &prior, lambda, iterations: settings.iterations };
     // Irradiance is nowhere negative. Coefficients have signs, but for the mean of all directions.
     let solved = match volume.irradiance.signed() {

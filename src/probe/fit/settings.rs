@@ -42,14 +42,13 @@ pub struct RowSettings {
     /// Weight of a row in the air; 0: there are none. With 0.3 errors are 1.01 to 1.07 times as large in pictures of five scenes,
     /// 1.0 to 1.03 times in their air; with 0.03 at most 3 % smaller in pictures, up to a tenth larger in the air (courtyard).
     pub air: f32,
-    /// How much a squared difference of values from those before the fit counts beside one of [`USUAL_ROWS`] rows. With 0.3: 1.17
-    /// to 1.25 × the error in pictures of two_rooms_open, thin_wall and cornell, with 0.01 as much as with 0.03.
+    /// How much a squared difference of values from those before the fit counts beside one of a row. With 0.3: 1.17 to 1.25 × the error in pictures of two_rooms_open, thin_wall and cornell, with 0.01 as much as with 0.03.
     pub lambda: f32,
     /// Most iterations of the solver.
     pub iterations: u32,
 }
 
-/// Rows a probe that λ and the numbers of paths are given for.
+/// Rows a probe that the numbers of paths are given for.
 const USUAL_ROWS: u32 = 75;
 
 /// Most rows of a probe, paths of a row and iterations.
@@ -77,11 +76,6 @@ impl RowSettings {
         [all, half(self.bent), half(self.air)]
     }
 
-    /// λ beside all rows of a probe: however many there are, values are held as firmly beside all of them.
-    pub fn firmness(&self) -> f32 {
-        self.lambda * self.rows_per_probe as f32 / USUAL_ROWS as f32
-    }
-
     /// How many times fewer rows there are than usually; 1 where there are as many or more.
     pub fn scarcity(&self) -> f32 {
         (USUAL_ROWS as f32 / self.rows_per_probe as f32).max(1.0)
@@ -89,8 +83,8 @@ impl RowSettings {
 
     /// Paths from each point of a kind of row, least and most.
     ///
-    /// The fewer rows there are the more each of them counts, noise and all. With 19 rows errors in pictures of six scenes are 1.01
-    /// to 1.14 times those with 75; if each had as few paths, 1.06 to 1.39 times.
+    /// The fewer rows there are the more each of them counts, noise and all. With 19 rows errors in pictures of six scenes are 1.10
+    /// to 1.26 times those with 75; if each had as few paths, up to 1.5 times.
     ///
     /// A row of weight ω adds ω²σ²/n of noise to the sums. For a given number of paths in all that is least with n in proportion to ω,
     /// but for the least: with half of it for bent normals and the air, probes that hang on few rows of the air differed by 109 %

@@ -329,14 +329,11 @@ fn held_out_points_of_each_kind_have_figures_of_their_own() {
 #[test]
 fn scarce_rows_have_more_paths_and_light_ones_fewer() {
     // 75/19 = 3.95 times as many where there are 19.
-    for (rows_per_probe, paths, lambda) in [
-        (75, [[4, 32], [4, 16], [4, 4]], 0.03),
-        (150, [[4, 32], [4, 16], [4, 4]], 0.06),
-        (19, [[16, 127], [16, 64], [16, 16]], 0.0076),
-    ] {
+    for (rows_per_probe, paths) in
+        [(75, [[4, 32], [4, 16], [4, 4]]), (150, [[4, 32], [4, 16], [4, 4]]), (19, [[16, 127], [16, 64], [16, 16]])]
+    {
         let settings = RowSettings { rows_per_probe, ..RowSettings::default() };
         assert_eq!([Kind::Surface, Kind::Bent, Kind::Air].map(|kind| settings.paths(kind)), paths);
-        assert!((settings.firmness() - lambda).abs() < 1e-6, "{}", settings.firmness());
     }
 }
 

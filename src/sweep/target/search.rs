@@ -136,13 +136,12 @@ impl Search<'_, '_> {
             }
         };
         let next = self.next(&steps, &kept, noise);
-        let (error, standard_error) = (kept.report.error, kept.report.standard_error);
         let met = measured(&kept.report).is_some_and(|step| step.meets(self.error));
-        let few = if met { None } else { self.few_points(&kept, &held_out) };
+        let few = (!met).then(|| self.few_points(&kept, &held_out)).flatten();
         let report = TargetReport {
             error: self.error,
-            reached: error,
-            standard_error,
+            reached: kept.report.error,
+            standard_error: kept.report.standard_error,
             met,
             seen: self.seen(&kept)?,
             points: held_out.points.len(),
@@ -167,11 +166,10 @@ impl Search<'_, '_> {
         let few = sampled::concentration(&kept.found, &held_out.truth)?;
         let (_, point) = held_out.points.get(few.worst).filter(|_| few.points as f64 <= FEW * of as f64)?;
         let [x, y, z] = (self.world.scene.origin_world + point.position.as_dvec3()).to_array();
-        let times = format::significant(few.times_mean, 2);
+        let (points, times) = (few.points, format::significant(few.times_mean, 2));
         Some(format!(
-            "half of the squared error is that of {} of {of} points, most of it at ({x:.2}, {y:.2}, {z:.2}) with {times} times \
-             the mean light",
-            few.points
+            "half of the squared error is that of {points} of {of} points, most of it at ({x:.2}, {y:.2}, {z:.2}) with \
+             {times} times the mean light"
         ))
     }
 

@@ -42,7 +42,8 @@ pub struct RowSettings {
     /// Weight of a row in the air; 0: there are none. With 0.3 errors are 1.01 to 1.07 times as large in pictures of five scenes,
     /// 1.0 to 1.03 times in their air; with 0.03 at most 3 % smaller in pictures, up to a tenth larger in the air (courtyard).
     pub air: f32,
-    /// How much a squared difference of values from those before the fit counts beside one of a row. With 0.3: 1.17 to 1.25 × the error in pictures of two_rooms_open, thin_wall and cornell, with 0.01 as much as with 0.03.
+    /// How much a squared difference of values from those before the fit counts beside one of a row. With 0.3: 1.17 to 1.25 ×
+    /// the error in pictures of two_rooms_open, thin_wall and cornell, with 0.01 as much as with 0.03.
     pub lambda: f32,
     /// Most iterations of the solver.
     pub iterations: u32,

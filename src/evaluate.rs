@@ -17,13 +17,16 @@ use crate::probe::capture::CaptureSettings;
 use crate::probe::query::{Answers, Query};
 use crate::probe::transport::truth::Truth;
 use crate::report::baked::{self, BakedReport};
+use crate::report::bent::BentFigures;
 use crate::report::glossy::{self, GlossyPart, GlossyReport, TracedRays};
 use crate::report::reference_layers::ReferenceLayers;
 use crate::report::render::{MethodReport, Timing};
 use crate::report::{air, error, leak};
-use crate::shade::air::{Air, AirTruth};
+use crate::shade::air::Air;
+use crate::shade::bent::Bent;
 use crate::shade::glossy::{Ends, Glossy, glosses};
 use crate::shade::layers::{compose, to_pixels};
+use crate::shade::point_truth::PointTruth;
 use crate::shade::points::{ImagePoint, View};
 use crate::shade::regions::Region;
 use crate::shade::traced::Rays;
@@ -40,9 +43,10 @@ pub const DIFFUSE_RAYS: &str = "diffuse_rays";
 pub struct Scenery<'a, 's> {
     pub world: &'a World<'s>,
     pub view: &'a View,
+    pub bent: Bent,
     /// Time of the primary rays.
     pub primary_s: f64,
-    /// Of the points in the air.
+    /// Of the points in the air and of bent normals.
     pub seed: u64,
 }
 
@@ -53,6 +57,8 @@ pub struct Shaded {
     pub irradiance: Vec<Vec3>,
     /// At every point of the air, W·m⁻².
     pub in_air: Vec<Vec3>,
+    /// At every point with a bent normal, W·m⁻².
+    pub bent: Vec<Vec3>,
     pub report: MethodReport,
     pub image: LayeredImage,
 }
@@ -77,7 +83,11 @@ pub struct Seen<'a> {
     pub air: &'a Air,
 }
 
-impl Scenery<'_, '_> {
+impl<'a, 's> Scenery<'a, 's> {
+    pub fn new(world: &'a World<'s>, view: &'a View, primary_s: f64, seed: u64) -> Scenery<'a, 's> {
+        Scenery { world, view, bent: Bent::of(view, seed), primary_s, seed }
+    }
+
     /// Which probes the view's points see, and the seconds that it took to find out.
     pub fn masks(&self, query: &impl Answers) -> (Vec<u8>, f64) {
         let started = Instant::now();
@@ -102,8 +112,10 @@ impl Scenery<'_, '_> {
         let exact = irradiance(query, points, masks, VisibilityMode::Ray);
         let exact_in_air = air.irradiance(query, VisibilityMode::Ray);
         let outside_hull = outside_hull(query, self.view);
+        let mut bent = self.bent.irradiance(self.world, query, VisibilityMode::ALL);
         VisibilityMode::ALL.map(|mode| {
             let in_air = air.irradiance(query, mode);
+            let bent = std::mem::take(&mut bent[mode as usize]);
             let irradiance = irradiance(query, points, masks, mode);
             let lookup = Some(time_lookup(query, points, masks, mode)).filter(|runs| !runs.is_empty()).map(Timing::of);
             let ray_s = if mode == VisibilityMode::Ray { self.primary_s + masks_s } else { self.primary_s };
@@ -118,12 +130,13 @@ impl Scenery<'_, '_> {
                 leak: leak::measure(query, points, masks, mode, &irradiance, &exact),
                 outside_hull,
                 air: air::measure(air, &in_air, &exact_in_air),
+                bent: BentFigures::of(&bent),
                 error: None,
                 error_gltf: None,
                 glossy: None,
             };
             step();
-            Shaded { mode, image: compose(self.view, &irradiance), irradiance, in_air, report }
+            Shaded { mode, image: compose(self.view, &irradiance), irradiance, in_air, bent, report }
         })
     }
 
@@ -195,7 +208,8 @@ impl Scenery<'_, '_> {
             ..like.report.clone()
         };
         let image = compose(self.view, &shown);
-        Some(Shaded { mode: VisibilityMode::On, image, irradiance: shown, in_air: like.in_air.clone(), report })
+        let (in_air, bent) = (like.in_air.clone(), like.bent.clone());
+        Some(Shaded { mode: VisibilityMode::On, image, irradiance: shown, in_air, bent, report })
     }
 
     /// One look-up by its own rules, at these points of the air.
@@ -219,6 +233,7 @@ impl Scenery<'_, '_> {
     ) -> Shaded {
         let points = &self.view.points;
         let shown = irradiance(query, points, masks, mode);
+        let [bent] = self.bent.irradiance(self.world, query, [mode]);
         let (in_air, exact_in_air) = (air.irradiance(query, mode), air.irradiance(query, VisibilityMode::Ray));
         let exact = if mode == VisibilityMode::Ray {
             shown.clone()
@@ -233,7 +248,7 @@ impl Scenery<'_, '_> {
             glossy: None,
             ..like.clone()
         };
-        Shaded { mode, image: compose(self.view, &shown), irradiance: shown, in_air, report }
+        Shaded { mode, image: compose(self.view, &shown), irradiance: shown, in_air, bent, report }
     }
 }
 
@@ -303,9 +318,10 @@ impl Shaded {
         }
     }
 
-    /// Adds the error in the air.
-    pub fn compare_in_air(&mut self, air: &Air, truth: &AirTruth) {
-        self.report.air.compare(air, &self.in_air, truth);
+    /// Adds the errors in the air and of bent normals, from the truths there.
+    pub fn compare_at_points(&mut self, air: &Air, (in_air, bent): (&PointTruth, &PointTruth)) {
+        self.report.air.compare(air, &self.in_air, in_air);
+        self.report.bent.compare(&self.bent, bent);
     }
 }
 

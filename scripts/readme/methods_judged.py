@@ -34,9 +34,11 @@ def times(value):
 JUDGED = [
     ("error", "bytes", "error_relative"),
     ("corners", "bytes", "error_corner"),
+    ("bent normals", "bytes", "error_bent"),
     ("in air", "bytes", "air_error"),
     ("error, equal positions", "positions", "error_relative"),
     ("corners", "positions", "error_corner"),
+    ("bent normals", "positions", "error_bent"),
     ("in air", "positions", "air_error"),
 ]
 
@@ -94,6 +96,7 @@ def offsets_table(scenes):
 ABLATED = [
     ("error", "error_relative"),
     ("corners", "error_corner"),
+    ("bent normals", "error_bent"),
     ("in air", "air_error"),
     ("leak light", "leak_light"),
     ("leak dark", "leak_dark"),

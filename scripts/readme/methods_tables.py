@@ -41,6 +41,7 @@ FIGURES = [
     ("error", "error_relative", percent),
     ("corners", "error_corner", percent),
     ("elsewhere", "error_flat", percent),
+    ("bent normals", "error_bent", percent),
     ("in air", "air_error", percent),
     ("black in air", "air_black", percent),
     ("leak light", "leak_light", percent),

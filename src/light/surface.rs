@@ -5,9 +5,13 @@ use rayon::prelude::*;
 
 use super::World;
 use super::emitters::receiver::Receiver;
+use crate::math::sampling::uniform_sphere;
 use crate::scene::{Scene, TriangleIndex};
 use crate::trace::offset::ray_offset;
 use crate::trace::{Hit, Ray};
+
+/// How far relief bends normals at most: by asin 0.6 = 37°.
+const BEND: f32 = 0.6;
 
 /// All data that shading at a hit needs. Normals lie on the side of the ray's origin, which is the viewer's side.
 #[derive(Debug, Clone, Copy)]
@@ -43,6 +47,13 @@ impl SurfacePoint {
             ray_offset: 0.0,
             hit: Hit { t: 0.0, triangle: TriangleIndex(u32::MAX), barycentric: Vec2::ZERO },
         }
+    }
+
+    /// A normal as relief bends it: n + [`BEND`]·u, u on the unit sphere, from two numbers uniform in [0,1); `None` where that
+    /// points below the surface.
+    pub fn bent(&self, numbers: Vec2) -> Option<Vec3> {
+        let bent = (self.shading_normal + BEND * uniform_sphere(numbers)).normalize_or(self.shading_normal);
+        (bent.dot(self.geometric_normal) > 0.0).then_some(bent)
     }
 
     /// Start of rays that leave the surface on the viewer's side.

@@ -36,6 +36,14 @@ pub enum Purpose {
     Air = 17,
     /// Paths from points of free air.
     AirPaths = 18,
+    /// Bent normals of points of a picture.
+    Bent = 24,
+    /// Paths from these points.
+    BentPaths = 25,
+    /// Rays that find where indirect light is kept.
+    CacheRays = 26,
+    /// Paths that find this light.
+    CachePaths = 27,
     /// Shifts of grids against the scene.
     Offsets = 19,
     /// Points that probes are fitted at.

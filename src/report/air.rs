@@ -6,11 +6,10 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use super::error::pooled::Pooled;
-use super::error::root_error;
-use super::reference_layers::ReferenceNoise;
+use super::error::at_points::error_at_points;
 use crate::math::color::luminance;
-use crate::shade::air::{Air, AirTruth};
+use crate::shade::air::Air;
+use crate::shade::point_truth::PointTruth;
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct AirFigures {
@@ -69,36 +68,15 @@ pub fn measure(air: &Air, irradiance: &[Vec3], exact: &[Vec3]) -> AirFigures {
 
 impl AirFigures {
     /// Adds the error against the truth at the same points, and counts as black only those where that brings light.
-    pub fn compare(&mut self, air: &Air, irradiance: &[Vec3], truth: &AirTruth) {
-        let noise = truth.variance.clone().map(|variance| ReferenceNoise {
-            variance,
-            covariance: None,
-            blocks: Some(truth.blocks),
-        });
-        let (mut squares, mut mean, mut count) = (Pooled::default(), 0.0f64, 0.0f64);
-        for (i, (e, t)) in irradiance.iter().zip(&truth.irradiance).enumerate().filter(|(_, (e, _))| e.is_finite()) {
-            let of_channel = |c: usize| {
-                let d = f64::from(e[c]) - f64::from(t[c]);
-                (d * d - noise.as_ref().map_or(0.0, |noise| noise.between(i, c, c)), -2.0 * d, 2.0)
-            };
-            squares.add([0, 1, 2].map(of_channel), noise.as_ref().map(|noise| (noise, i)));
-            mean += f64::from(luminance(*t));
-            count += 1.0;
-        }
-        if mean <= 0.0 {
-            return;
-        }
-        let (mean, samples) = (mean / count, 3.0 * count);
-        let rmse = squares.mean(samples).max(0.0).sqrt();
-        self.error = Some(rmse / mean);
+    pub fn compare(&mut self, air: &Air, irradiance: &[Vec3], truth: &PointTruth) {
+        let Some((error, standard_error)) = error_at_points(irradiance, truth) else { return };
+        self.error = Some(error);
+        self.standard_error.error = standard_error;
         let is_black = |(i, e): &(usize, &Vec3)| {
             air.masks[*i] != 0 && luminance(**e) == 0.0 && luminance(truth.irradiance[*i]) > 0.0
         };
         let black = irradiance.iter().enumerate().filter(is_black).count();
         self.black = Some(black as f64 / irradiance.len() as f64);
-        // The mean over the points is known far better than the squares.
-        let error = || root_error(rmse, squares.variance(samples).sqrt()) / mean;
-        self.standard_error.error = noise.is_some().then(error);
     }
 }
 
@@ -132,7 +110,7 @@ mod tests {
         close(figures.leak_dark, 0.5);
         assert_eq!((figures.points, figures.black, figures.unseen), (4, Some(0.25), Some(0.25)));
         // Where no light comes, none is missing.
-        let truth = |of_second: f32| AirTruth {
+        let truth = |of_second: f32| PointTruth {
             irradiance: grey([2.0, of_second, 0.0, 2.0]).to_vec(),
             variance: None,
             blocks: 1,
@@ -149,7 +127,7 @@ mod tests {
     fn the_error_is_relative_and_free_of_noise() {
         let (irradiance, truth) = (vec![Vec3::splat(2.5); 64], vec![Vec3::splat(2.0); 64]);
         let mut figures = AirFigures::default();
-        let known = |variance| AirTruth { irradiance: truth.clone(), variance, blocks: 1 << 20 };
+        let known = |variance| PointTruth { irradiance: truth.clone(), variance, blocks: 1 << 20 };
         figures.compare(&air(&[1; 64]), &irradiance, &known(None));
         assert!((figures.error.unwrap() - 0.25).abs() < 1e-6 && figures.standard_error.error.is_none());
         figures.compare(&air(&[1; 64]), &irradiance, &known(Some(vec![Vec3::splat(0.09); 64])));
@@ -160,7 +138,7 @@ mod tests {
         let expected = (0.4 - (0.16 - 2.0 * s).sqrt()) / 4.0;
         assert!((figures.standard_error.error.unwrap() / expected - 1.0).abs() < 1e-4, "{figures:?} {expected}");
         let mut dark = AirFigures::default();
-        dark.compare(&air(&[1]), &[Vec3::ONE], &AirTruth { irradiance: vec![Vec3::ZERO], variance: None, blocks: 1 });
+        dark.compare(&air(&[1]), &[Vec3::ONE], &PointTruth { irradiance: vec![Vec3::ZERO], variance: None, blocks: 1 });
         assert_eq!(dark.error, None);
     }
 }

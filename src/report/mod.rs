@@ -3,6 +3,7 @@
 pub mod air;
 pub mod bake;
 pub mod baked;
+pub mod bent;
 pub mod colormap;
 pub mod diff;
 pub mod draw;

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::air::AirFigures;
 use super::baked::BakedReport;
+use super::bent::BentFigures;
 use super::error::ErrorReport;
 use super::glossy::GlossyReport;
 use super::header::Header;
@@ -97,6 +98,8 @@ pub struct MethodReport {
     pub outside_hull: Option<f64>,
     /// At random points of free air.
     pub air: AirFigures,
+    /// At points of the picture with bent normals.
+    pub bent: BentFigures,
     /// Against a reference of diffuse transport, as probes have it; `null` without one.
     pub error: Option<ErrorReport>,
     /// Against a reference with glossy transport, which probes do not have; absent without one.

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::air::AirFigures;
 use super::baked::BakedFigures;
+use super::bent::BentFigures;
 use super::error::Figures;
 use super::header::Header;
 use super::leak::Leak;
@@ -206,6 +207,7 @@ pub struct MethodFigures {
     pub leak: Leak,
     pub outside_hull: Option<f64>,
     pub air: AirFigures,
+    pub bent: BentFigures,
     /// `error.nrmse`.
     pub error_relative: Option<f64>,
     /// `error.by_region.corner.nrmse`, `error.by_region.flat.nrmse`.

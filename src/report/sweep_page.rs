@@ -28,6 +28,7 @@ type Figure = (&'static str, &'static str, fn(f64) -> String);
 const FIGURES: &[Figure] = &[
     ("error", "error_relative", format::percent),
     ("in corners", "error_corner", format::percent),
+    ("bent normals", "error_bent", format::percent),
     ("leak light", "leak_light", format::percent),
     ("leak dark", "leak_dark", format::percent),
     ("blocks", "leak_blocks", format::percent),

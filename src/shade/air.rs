@@ -10,13 +10,11 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::block_mean::BlockMean;
+use super::point_truth::PointTruth;
 use super::visibility_modes::VisibilityMode;
 use crate::light::World;
 use crate::light::contact::Contacts;
-use crate::light::path::PathSettings;
 use crate::light::surface::SurfacePoint;
-use crate::math::blocks::{BLOCK, Block};
 use crate::math::random::{Purpose, Random};
 use crate::math::sampling::uniform_sphere;
 use crate::probe::lattice::Grid;
@@ -31,9 +29,6 @@ pub const POINTS: u32 = 4096;
 /// Places tried for each point. Where nine tenths of the volume are solid, 1 point in 850 finds none.
 const TRIES: u32 = 64;
 
-/// Blocks of paths from each point at most. Their noise is subtracted, and the mean over so many points needs no more.
-const MOST_BLOCKS: u32 = 4;
-
 /// Points of free air and which of their probes they see.
 #[derive(Debug, Clone, Default)]
 pub struct Air {
@@ -41,17 +36,6 @@ pub struct Air {
     pub points: Arc<Vec<QueryPoint>>,
     /// Bit i: whether the segment to the probe of corner i is unblocked, and the probe active.
     pub masks: Vec<u8>,
-}
-
-/// The light that arrives at the points by paths, as probes hold it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AirTruth {
-    /// W·m⁻².
-    pub irradiance: Vec<Vec3>,
-    /// Variance of each mean, per channel; `None` from less than two blocks of paths.
-    pub variance: Option<Vec<Vec3>>,
-    /// Independent blocks of paths from each point.
-    pub blocks: u32,
 }
 
 impl Air {
@@ -73,20 +57,11 @@ impl Air {
         asked.map(|(point, &mask)| query.irradiance(point, mode.visibility(mask))).collect()
     }
 
-    /// The truth at the points, by `spp` paths from each, rounded up to whole blocks of sixteen, at most 64.
-    pub fn truth(&self, world: &World, spp: u32, seed: u64) -> AirTruth {
-        let blocks = spp.div_ceil(BLOCK).clamp(1, MOST_BLOCKS);
-        let at = |(index, point): (usize, &QueryPoint)| {
-            let surface = SurfacePoint::in_space(point.position, point.normal);
-            let mut light = BlockMean::default();
-            for b in 0..blocks {
-                let block = Block::new(seed, Purpose::AirPaths, index as u64, u64::from(b));
-                light.add(world, (&surface, point), &PathSettings::default(), &block);
-            }
-            (light.mean.as_vec3(), light.variance().as_vec3())
-        };
-        let (irradiance, variance) = self.points.par_iter().enumerate().map(at).unzip();
-        AirTruth { irradiance, variance: (blocks > 1).then_some(variance), blocks }
+    /// The truth at the points, see [`PointTruth::trace`].
+    pub fn truth(&self, world: &World, spp: u32, seed: u64) -> PointTruth {
+        let in_space = |point: &QueryPoint| (SurfacePoint::in_space(point.position, point.normal), *point);
+        let points: Vec<(SurfacePoint, QueryPoint)> = self.points.iter().map(in_space).collect();
+        PointTruth::trace(world, &points, Purpose::AirPaths, spp, seed)
     }
 }
 

@@ -1,6 +1,6 @@
 //! One bake of a sweep, and what it is worth.
 
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -18,7 +18,8 @@ use crate::probe::query::{Query, QueryPoint};
 use crate::report::error::{ByRegion, ErrorEstimate};
 use crate::report::reference_layers::ReferenceLayers;
 use crate::report::sweep::{BakeTimes, GlossyFigures, MethodFigures, RunRecord, TruthRecord};
-use crate::shade::air::{self, Air, AirTruth};
+use crate::shade::air::{self, Air};
+use crate::shade::point_truth::PointTruth;
 use crate::shade::reference::ReferenceSettings;
 use crate::shade::visibility_modes::VisibilityMode;
 use crate::system::progress::Progress;
@@ -39,11 +40,16 @@ pub struct Setting<'a, 's> {
 }
 
 /// Points of the air, and the light there.
-type KnownAir = (Arc<Vec<QueryPoint>>, Arc<AirTruth>);
+type KnownAir = (Arc<Vec<QueryPoint>>, Arc<PointTruth>);
 
-/// What was traced in the air already, by the bits of the corners of the points' box.
+/// What was traced already.
 #[derive(Debug, Default)]
-pub struct Truths(RefCell<HashMap<[[u32; 3]; 2], KnownAir>>);
+pub struct Truths {
+    /// By the bits of the corners of the points' box.
+    in_air: RefCell<HashMap<[[u32; 3]; 2], KnownAir>>,
+    /// At points of the picture with bent normals.
+    bent: OnceCell<PointTruth>,
+}
 
 /// A finished run, new or from the store.
 #[derive(Debug, Clone)]
@@ -114,7 +120,7 @@ impl Setting<'_, '_> {
         let [_, mut on, mut ray] = self.scenery.shade(&query, seen, bake.bytes_per_probe, || {});
         let figures = |shaded: &mut Shaded| {
             shaded.compare(&self.comparison);
-            shaded.compare_in_air(&air, &in_air);
+            shaded.compare_at_points(&air, (&in_air, self.bent()));
             self.figures(shaded)
         };
         let record = TruthRecord {
@@ -155,7 +161,7 @@ impl Setting<'_, '_> {
         let mut shaded = self.scenery.shade(&query, seen, bake.bytes_per_probe, || {});
         for s in &mut shaded {
             s.compare(&self.comparison);
-            s.compare_in_air(&air, &in_air);
+            s.compare_at_points(&air, (&in_air, self.bent()));
         }
         // The file's own weights: they know the box that rays end at.
         let query = Query { settings: &bake.probes.query.weights, ..query };
@@ -169,11 +175,11 @@ impl Setting<'_, '_> {
     }
 
     /// Points of the air, and the truth there. Configurations that cover the same share both.
-    fn in_air(&self, query: &Query) -> (Air, Arc<AirTruth>) {
+    fn in_air(&self, query: &Query) -> (Air, Arc<PointTruth>) {
         let world = self.scenery.world;
         let (low, high) = air::bounds(world, &query.volume.grid);
         let key = [low, high].map(|corner| corner.to_array().map(f32::to_bits));
-        let mut known = self.truths.0.borrow_mut();
+        let mut known = self.truths.in_air.borrow_mut();
         if let Some((points, truth)) = known.get(&key) {
             return (Air::of(world, query, Arc::clone(points)), Arc::clone(truth));
         }
@@ -182,6 +188,12 @@ impl Setting<'_, '_> {
         let truth = Arc::new(air.truth(world, spp, seed));
         known.insert(key, (Arc::clone(&air.points), Arc::clone(&truth)));
         (air, truth)
+    }
+
+    /// The truth of bent normals, which all configurations share.
+    fn bent(&self) -> &PointTruth {
+        let ReferenceSettings { spp, seed, .. } = self.reference_settings;
+        self.truths.bent.get_or_init(|| self.scenery.bent.truth(self.scenery.world, spp, seed))
     }
 
     fn record(&self, seed: u64, bake: &Bake, shaded: &[Shaded; 3]) -> RunRecord {
@@ -226,6 +238,7 @@ impl Setting<'_, '_> {
             leak: report.leak,
             outside_hull: report.outside_hull,
             air: report.air,
+            bent: report.bent,
             error_relative: error.nrmse,
             error_corner: region(|regions| &regions.corner),
             error_flat: region(|regions| &regions.flat),

@@ -232,6 +232,7 @@ fn render_reports() {
                 "air.leak_dark",
                 "air.black",
                 "air.unseen",
+                "bent.points",
             ],
         );
         let shade = |key: &str| method["shade_ms"][key].as_f64().unwrap();

@@ -257,7 +257,7 @@ fn render_camera<A: Answers>(run: &Run<A>, camera: &Camera, folder: &Path) -> Re
     let primary_s = primary_started.elapsed().as_secs_f64();
     tell::too_bright(session.console, view.clamped(), ["point of the picture", "points of the picture"]);
     bar.inc(1);
-    let scenery = Scenery { world: run.world, view: &view, primary_s, seed: session.seed };
+    let scenery = Scenery::new(run.world, &view, primary_s, session.seed);
     let (masks, masks_s) = scenery.masks(query);
     bar.inc(1);
     let air = scenery.air(query);
@@ -288,9 +288,10 @@ fn render_camera<A: Answers>(run: &Run<A>, camera: &Camera, folder: &Path) -> Re
         compare(session, reference, exposure_ev, all);
     }
     if let Some(spp) = args.reference {
-        let truth = air.truth(run.world, spp, session.seed);
+        let in_air = air.truth(run.world, spp, session.seed);
+        let bent = scenery.bent.truth(run.world, spp, session.seed);
         let all = shaded.iter_mut().chain(&mut path_traced).chain(&mut as_engine);
-        all.for_each(|shaded| shaded.compare_in_air(&air, &truth));
+        all.for_each(|shaded| shaded.compare_at_points(&air, (&in_air, &bent)));
     }
     warn_about(&camera.name, exposure_ev, &shaded[1].report, args, session.console);
     create_folder(folder)?;

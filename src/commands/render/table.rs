@@ -40,14 +40,17 @@ const OF_REFERENCE: &[Row] = &[
     ("error in corners", |m| errors_of(m).map_or(format::UNDEFINED.to_owned(), |e| relative_rmse(&e.by_region.corner))),
     ("error elsewhere", |m| errors_of(m).map_or(format::UNDEFINED.to_owned(), |e| relative_rmse(&e.by_region.flat))),
     ("falsely black", |m| percent(m.leak.black)),
-    ("in the air: error", |m| {
-        let error = m.air.standard_error.error.map(|e| 100.0 * e);
-        format::or_undefined(m.air.error, |share| format!("{} %", format::with_error(100.0 * share, error)))
-    }),
+    ("in the air: error", |m| with_error(m.air.error, m.air.standard_error.error)),
+    ("bent normals: error", |m| with_error(m.bent.error, m.bent.standard_error.error)),
 ];
 
 fn percent(share: Option<f64>) -> String {
     format::or_undefined(share, format::percent)
+}
+
+fn with_error(share: Option<f64>, standard_error: Option<f64>) -> String {
+    let error = standard_error.map(|e| 100.0 * e);
+    format::or_undefined(share, |share| format!("{} %", format::with_error(100.0 * share, error)))
 }
 
 /// From the least to the most of the runs, ns.
@@ -75,7 +78,10 @@ pub fn table(report: &RenderReport) -> String {
         format::percent(unseen),
     );
     let mean = report.reference.as_ref().and_then(|r| r.irradiance_indirect_mean);
-    let points = report.methods.first().map(|m| format!("in the air: at {} points of free air", m.air.points));
+    let points = report.methods.first().map(|m| {
+        let (air, bent) = (m.air.points, m.bent.points);
+        format!("in the air: at {air} points of free air; bent normals: at {bent} points of the picture")
+    });
     let baked = report.baked.as_ref().filter(|b| b.figures.bias.is_some()).map(baked_line);
     let fitted = report.fitted.then(|| unfit_line(report));
     let reason = report.baked_reason.map(|reason| format!("no figure of the bake itself: {reason}"));

@@ -78,7 +78,7 @@ pub fn run(args: &SweepArgs, console: &Console) -> Result<()> {
     let primary_started = Instant::now();
     let view = see(&world, &camera, args.view.size.width, args.view.size.height, session.seed);
     let primary_s = primary_started.elapsed().as_secs_f64();
-    let scenery = Scenery { world: &world, view: &view, primary_s, seed: session.seed };
+    let scenery = Scenery::new(&world, &view, primary_s, session.seed);
     let regions = regions(&world, &view);
     let (mean, standard_error) = reference.layers.means(|i| regions[i].is_some());
     let exposure_ev = view.auto_exposure_ev(&reference.layers.beauty);

@@ -85,6 +85,7 @@ fn csv(report: &SweepReport) -> Result<Vec<u8>> {
                 ("error_relative", number(m.error_relative)),
                 ("error_corner", number(m.error_corner)),
                 ("error_flat", number(m.error_flat)),
+                ("error_bent", number(m.bent.error)),
                 ("error_rmse", number(e.rmse)),
                 ("error_nrmse", number(e.nrmse)),
                 ("error_relmse", number(e.relmse)),

@@ -50,6 +50,7 @@ const FIGURES: &[(&str, Figure)] = &[
     ("error_relative", |_, m| m.error_relative),
     ("error_corner", |_, m| m.error_corner),
     ("error_flat", |_, m| m.error_flat),
+    ("error_bent", |_, m| m.bent.error),
     ("error_mae", |_, m| m.error.mae),
     ("error_rmse", |_, m| m.error.rmse),
     ("error_nrmse", |_, m| m.error.nrmse),

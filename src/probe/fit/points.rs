@@ -40,9 +40,6 @@ const MOST_HIDDEN: f32 = 0.01;
 /// One point in so many is held out.
 pub const HELD_OUT: usize = 10;
 
-/// How far normals are bent: n + 0.6·u, u on the unit sphere.
-const BEND: f32 = 0.6;
-
 /// Rounds in which points are looked for. Surfaces far beyond the grid may use up all points of one.
 const ROUNDS: usize = 4;
 
@@ -104,14 +101,7 @@ impl<A: Answers> Task<'_, '_, A> {
             return None;
         }
         let normal = match kind {
-            Kind::Bent => {
-                let around = uniform_sphere(Vec2::new(random.uniform(), random.uniform()));
-                let bent = (surface.shading_normal + BEND * around).normalize_or(surface.shading_normal);
-                if bent.dot(surface.geometric_normal) <= 0.0 {
-                    return None;
-                }
-                bent
-            }
+            Kind::Bent => surface.bent(Vec2::new(random.uniform(), random.uniform()))?,
             _ => surface.shading_normal,
         };
         let geometric = surface.geometric_normal;

@@ -27,6 +27,7 @@
 //! The verdict of a part of the picture is "reference too noisy" if Σv > Σ(d² − v) there, that is, if the noise exceeds
 //! the difference. Figures pooled over many pixels can still be well determined; their standard errors tell.
 
+pub mod at_points;
 pub mod flip;
 pub mod pooled;
 pub mod sampled;

@@ -9,6 +9,7 @@ pub mod emitters;
 pub mod expected;
 pub mod ggx;
 pub mod incident;
+pub mod irradiance_cache;
 pub mod lambert;
 pub mod layered;
 pub mod learn;

@@ -16,6 +16,8 @@ use super::emitters::receiver::Receiver;
 use super::emitters::shares::Shares;
 use super::expected::{Expected, Light};
 use super::incident::{Incident, incident};
+use super::irradiance_cache::IrradianceCache;
+use super::lambert::reflected_radiance;
 use super::roulette::survival;
 use super::sampled::RayCount;
 use super::surface::SurfacePoint;
@@ -51,6 +53,9 @@ pub struct PathSettings<'e> {
     pub firefly_clamp: Option<f32>,
     /// What places are expected to receive: paths are then followed for as long as they are worth it.
     pub expected: Option<&'e Expected>,
+    /// Indirect light that is known, of Lambertian surfaces: paths end there. The result is right in the mean over patches, no
+    /// longer at every point.
+    pub cache: Option<&'e IrradianceCache>,
 }
 
 /// One sample of the light that arrives at a surface point, without the direct light of punctual lights.
@@ -117,6 +122,22 @@ impl World<'_> {
             }
             _ => gathered,
         }
+    }
+
+    /// One sample of the irradiance at a point but for what rays towards emitters find there, W·m⁻²: that by which a path goes on.
+    pub fn onward(
+        &self,
+        point: &SurfacePoint,
+        view: Vec3,
+        settings: &PathSettings,
+        numbers: &mut BlockSample,
+        rays: &mut RayCount,
+    ) -> Vec3 {
+        let bsdf = Bsdf::new(self, point, point.shading_normal, view, settings.transport).covering();
+        let vertex = self.vertex(point, &bsdf, settings);
+        numbers.seek(PAIR_SCATTER);
+        let Some(step) = Step::sample(point, &bsdf, numbers) else { return Vec3::ZERO };
+        self.incoming(vertex, &step, settings, numbers, rays) * (step.cosine / step.density)
     }
 
     /// A surface point of a path.
@@ -196,6 +217,11 @@ impl World<'_> {
                 self.emitter_sample(&vertex, &bsdf, settings, bounce, numbers, rays)
             {
                 sum += throughput * radiance * bsdf.scattered(direction, cosine).total();
+            }
+            if let (Some(cache), Bsdf::Lambert { albedo, .. }) = (settings.cache, &bsdf)
+                && let Some(irradiance) = cache.at(self, &point, numbers.salt())
+            {
+                return sum + throughput * reflected_radiance(*albedo, irradiance);
             }
             numbers.seek(bounce * PAIRS_PER_VERTEX + PAIR_SCATTER);
             let Some(next) = Step::sample(&point, &bsdf, numbers) else { return sum };

@@ -4,6 +4,9 @@
 //! (Veach & Guibas 1995) combines them. The place's [`Shares`] divides the samples between them; the estimate is unbiased
 //! for any division.
 
+use std::iter::Sum;
+use std::ops::Add;
+
 use glam::{Vec2, Vec3};
 
 use super::World;
@@ -22,6 +25,20 @@ pub struct RayCount {
     pub primary: u64,
     /// Rays that test whether light arrives.
     pub shadow: u64,
+}
+
+impl Add for RayCount {
+    type Output = RayCount;
+
+    fn add(self, other: RayCount) -> RayCount {
+        RayCount { primary: self.primary + other.primary, shadow: self.shadow + other.shadow }
+    }
+}
+
+impl Sum for RayCount {
+    fn sum<I: Iterator<Item = RayCount>>(all: I) -> RayCount {
+        all.fold(RayCount::default(), Add::add)
+    }
 }
 
 impl RayCount {

@@ -62,6 +62,7 @@ impl ReferenceSettings {
     fn path<'e>(&self, expected: &'e Expected) -> PathSettings<'e> {
         PathSettings {
             expected: Some(expected),
+            cache: None,
             transport: self.transport,
             strategy: self.strategy,
             max_bounces: self.max_bounces,
@@ -379,8 +380,6 @@ struct Counts {
 
 impl Counts {
     fn plus(self, other: Counts) -> Counts {
-        let rays =
-            RayCount { primary: self.rays.primary + other.rays.primary, shadow: self.rays.shadow + other.rays.shadow };
-        Counts { rays, non_finite: self.non_finite + other.non_finite }
+        Counts { rays: self.rays + other.rays, non_finite: self.non_finite + other.non_finite }
     }
 }

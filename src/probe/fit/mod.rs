@@ -97,7 +97,8 @@ pub fn run_on(
 ) -> FitFigures {
     let started = Instant::now();
     let asked = points::all(world, &fitted.look_up(), settings);
-    let (targets, rays, non_finite) = targets::trace(world, &asked, settings, seed, traced, &advance);
+    let (targets, rays, non_finite) =
+        targets::trace(world, &asked, settings, fitted.look_up().grid().spacing_min(), seed, traced, &advance);
     let before = figures::residuals(&fitted.look_up(), &asked, &targets);
     let lit = targets::without_brightest(&asked, &targets);
     let counts = |i: usize| asked[i].is_fitted && !asked[i].is_held_out && lit[i];
@@ -195,15 +196,19 @@ pub fn steps(fit: &Fit, active: usize) -> usize {
     }
 }
 
-/// Points that paths are traced from, those that judge counted twice, and about how many paths from each: half-way between
-/// the least and the most.
-pub fn traced(fit: &Fit, active: usize) -> (f64, u32) {
-    match fit {
-        Fit::None => (0.0, 0),
-        Fit::Rows(settings) => {
-            let points: usize = settings.points(active).iter().sum();
-            let [least, most] = settings.paths(Kind::Surface);
-            (points as f64 * (1.0 + 1.0 / points::HELD_OUT as f64), least.midpoint(most))
-        }
-    }
+/// Paths of a fit, about.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Paths {
+    /// From all points, those that judge counted twice, half-way between the least and the most. They end where light is known.
+    pub short: f64,
+    /// By which it gets known.
+    pub whole: f64,
+}
+
+pub fn paths(fit: &Fit, active: usize) -> Paths {
+    let Fit::Rows(settings) = fit else { return Paths::default() };
+    let points = settings.points(active);
+    let [least, most] = settings.paths(Kind::Surface);
+    let all = points.iter().sum::<usize>() as f64 * (1.0 + 1.0 / points::HELD_OUT as f64);
+    Paths { short: all * f64::from(least.midpoint(most)), whole: points[0] as f64 * f64::from(targets::PATCH_PATHS) }
 }

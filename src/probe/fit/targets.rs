@@ -9,8 +9,10 @@ use rayon::prelude::*;
 use super::points::Asked;
 use super::settings::{Kind, RowSettings};
 use crate::light::World;
+use crate::light::irradiance_cache::IrradianceCache;
 use crate::light::path::PathSettings;
 use crate::light::sampled::RayCount;
+use crate::light::surface::SurfacePoint;
 use crate::math::blocks::{BLOCK, Block};
 use crate::math::color::luminance;
 use crate::math::random::Purpose;
@@ -37,11 +39,17 @@ impl Target {
 const BRIGHTEST: f64 = 0.002;
 
 /// Variance that the points of a place, that is of a cell and a facing, are to be left with, as a share of the square of their light;
-/// less where rows are scarce.
-/// Where there is more, noise shows as blotches. Beside 16 paths from every point, at the same time: errors of two_rooms_open,
-/// thin_wall and cornell 4 to 5 % larger, of its dark side, courtyard, veach_ajar and bathroom 2 to 5 % smaller, and the dim wall of
-/// veach_ajar is smoother. With 0.02 and up to 48 paths 3 to 7 % smaller errors, for 1.2 times the time.
-const NOISE: f64 = 0.03;
+/// less where rows are scarce. Where there is more, noise shows as blotches. Twice as much: 0 to 7 % larger errors in
+/// two_rooms_open's dark side, thin_wall, cornell and courtyard; half as much with twice the paths at most: 0 to 6 % smaller ones, for
+/// 1.1 to 1.7 times the time.
+const NOISE: f64 = 0.01;
+
+/// Side of the patches that paths end at, spacings. In two_rooms_open's dark side, thin_wall, cornell and courtyard errors are the
+/// same within 1 % with twice that; with half of it paths end later, and a fit takes 1.4 times as long.
+const PATCH: f32 = 0.25;
+
+/// Paths for the patches from each point on surfaces. Twice as many: the same errors in these scenes within 1 %.
+pub const PATCH_PATHS: u32 = 4;
 
 /// Points whose light is traced at a time, and kept together.
 const AT_ONCE: usize = 1 << 14;
@@ -63,11 +71,13 @@ impl Traced for () {
     fn keep(&mut self, _: u32, _: &[u8]) {}
 }
 
-/// The light at all points that count, the rays that it took and how many paths were not finite and count as 0.
+/// The light at all points that count, the rays that it took and how many paths were not finite and count as 0. `spacing` is that of
+/// the probes, metres.
 pub fn trace(
     world: &World,
     asked: &[Asked],
     settings: &RowSettings,
+    spacing: f32,
     seed: u64,
     traced: &mut impl Traced,
     advance: &(impl Fn(u64) + Sync),
@@ -77,6 +87,11 @@ pub fn trace(
     let on_surface = asked.iter().filter(|asked| asked.kind != Kind::Air);
     let expected = world.expect(on_surface.map(|asked| world.places.key_of(&asked.surface)).collect());
     let path = PathSettings { expected: Some(&expected), ..PathSettings::default() };
+    let on_surfaces: Vec<SurfacePoint> =
+        asked.iter().filter(|asked| asked.kind == Kind::Surface).map(|asked| asked.surface).collect();
+    let side = PATCH * spacing;
+    let (cache, cache_rays) = IrradianceCache::new(world, &on_surfaces, PATCH_PATHS, side, &path, seed);
+    let path = PathSettings { cache: Some(&cache), ..path };
     let tracer = Tracer { world, path: &path, seed };
     let least = |index: usize| settings.paths(asked[index].kind)[0];
     let mut tallies = vec![Tally::default(); asked.len()];
@@ -95,12 +110,8 @@ pub fn trace(
         }
     };
     in_blocks(&mut tallies, 1, traced, more);
-    let mut rays = RayCount::default();
-    let mut lost = 0;
-    for of in &tallies {
-        rays = RayCount { primary: rays.primary + of.rays.primary, shadow: rays.shadow + of.rays.shadow };
-        lost += of.non_finite;
-    }
+    let rays = cache_rays + tallies.iter().map(|tally| tally.rays).sum();
+    let lost = tallies.iter().map(|tally| tally.non_finite).sum();
     (tallies.iter().map(Tally::target).collect(), rays, lost)
 }
 

@@ -7,6 +7,7 @@ pub mod bsdf;
 pub mod contact;
 pub mod emitters;
 pub mod expected;
+pub mod fill_cache;
 pub mod ggx;
 pub mod incident;
 pub mod irradiance_cache;

@@ -210,5 +210,5 @@ pub fn paths(fit: &Fit, active: usize) -> Paths {
     let points = settings.points(active);
     let [least, most] = settings.paths(Kind::Surface);
     let all = points.iter().sum::<usize>() as f64 * (1.0 + 1.0 / points::HELD_OUT as f64);
-    Paths { short: all * f64::from(least.midpoint(most)), whole: points[0] as f64 * f64::from(targets::PATCH_PATHS) }
+    Paths { short: all * f64::from(least.midpoint(most)), whole: (points[0] * targets::PATCH_PATHS) as f64 }
 }

@@ -9,13 +9,14 @@ use rayon::prelude::*;
 use super::points::Asked;
 use super::settings::{Kind, RowSettings};
 use crate::light::World;
-use crate::light::irradiance_cache::IrradianceCache;
 use crate::light::path::PathSettings;
 use crate::light::sampled::RayCount;
 use crate::light::surface::SurfacePoint;
 use crate::math::blocks::{BLOCK, Block};
 use crate::math::color::luminance;
-use crate::math::random::Purpose;
+use crate::math::random::{Numbers, Purpose, Random};
+use crate::math::sampling::cosine_hemisphere;
+use crate::trace::Ray;
 
 /// Irradiance, W·m⁻², of one or two independent runs. Points that judge have two: the product of the differences from both
 /// has no noise in the mean.
@@ -49,7 +50,7 @@ const NOISE: f64 = 0.01;
 const PATCH: f32 = 0.25;
 
 /// Paths for the patches from each point on surfaces. Twice as many: the same errors in these scenes within 1 %.
-pub const PATCH_PATHS: u32 = 4;
+pub const PATCH_PATHS: usize = 4;
 
 /// Points whose light is traced at a time, and kept together.
 const AT_ONCE: usize = 1 << 14;
@@ -87,10 +88,16 @@ pub fn trace(
     let on_surface = asked.iter().filter(|asked| asked.kind != Kind::Air);
     let expected = world.expect(on_surface.map(|asked| world.places.key_of(&asked.surface)).collect());
     let path = PathSettings { expected: Some(&expected), ..PathSettings::default() };
-    let on_surfaces: Vec<SurfacePoint> =
-        asked.iter().filter(|asked| asked.kind == Kind::Surface).map(|asked| asked.surface).collect();
-    let side = PATCH * spacing;
-    let (cache, cache_rays) = IrradianceCache::new(world, &on_surfaces, PATCH_PATHS, side, &path, seed);
+    let on_surfaces: Vec<&SurfacePoint> =
+        asked.iter().filter(|asked| asked.kind == Kind::Surface).map(|asked| &asked.surface).collect();
+    let ray = |index: usize| {
+        let point = on_surfaces[index / PATCH_PATHS];
+        let mut random = Random::new(seed, Purpose::CacheRays, index as u64, 0);
+        let direction = cosine_hemisphere(point.geometric_normal, random.pair());
+        Ray::new(point.ray_origin(), direction, random.bits())
+    };
+    let rays = PATCH_PATHS * on_surfaces.len();
+    let (cache, cache_rays) = world.irradiance_cache(rays, ray, PATCH * spacing, &path, seed);
     let path = PathSettings { cache: Some(&cache), ..path };
     let tracer = Tracer { world, path: &path, seed };
     let least = |index: usize| settings.paths(asked[index].kind)[0];

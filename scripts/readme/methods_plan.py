@@ -173,10 +173,10 @@ def positions(scene):
 
 
 def curves(scene):
+    """Without the large methods, whose ladders would take hours."""
     entries = []
-    for preset in PRESETS:
-        own = spacing_of(scene)
-        values = [s for s in SCENES[scene].get("curve", []) if s > own or preset not in LARGE]
+    for preset in (preset for preset in PRESETS if preset not in LARGE):
+        values = SCENES[scene].get("curve", [])
         if values:
             axes = f', axes: [(key: "grid.spacing_m", values: {values})]'
             entries.append(ladder(scene, "curves", preset, preset, [], axes))

@@ -45,7 +45,8 @@ fn a_fit_brings_look_ups_nearer_to_the_truth_for_any_number_of_threads() {
         assert!(number(&fit["held_out_bent_after"]) < 0.6 * number(&fit["held_out_bent_before"]), "{fit}");
         assert!(number(&fit["air_after"]) < number(&fit["air_before"]), "{fit}");
         assert!(number(&fit["rows"]) > 10.0 * number(&fitted.report["probes_active"]), "{fit}");
-        assert!((8.0..32.0).contains(&number(&fit["paths"])), "{fit}");
+        // 8 and at most 32 where there are 75 rows a probe; here each stands for 2.5.
+        assert!((20.0..80.0).contains(&number(&fit["paths"])), "{fit}");
         assert!(number(&fit["negative_share"]) < 0.01 && number(&fit["time_s"]) > 0.0, "{fit}");
         // In the report, and in the file without what differs from run to run.
         let recorded: Value = serde_json::from_str(&fitted.file.metadata["fit"]).unwrap();

@@ -16,13 +16,14 @@ use super::World;
 use super::surface::SurfacePoint;
 use crate::trace::Ray;
 
-/// Samples that a patch needs to be relied on.
+/// Samples that a patch needs to be relied on. Not varied.
 const LEAST_SAMPLES: usize = 8;
 
-/// Most patches of a cell in a place.
+/// Most patches of a cell in a place. Not varied.
 const MOST_PATCHES: usize = 4;
 
 /// Light is taken from patches at least so many cells away: from nearby one covers many directions, and corners would be blurred.
+/// Not varied.
 const LEAST_DISTANCE: f32 = 2.0;
 
 /// Indirect irradiance by patches.

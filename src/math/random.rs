@@ -36,14 +36,6 @@ pub enum Purpose {
     Air = 17,
     /// Paths from points of free air.
     AirPaths = 18,
-    /// Bent normals of points of a picture.
-    Bent = 24,
-    /// Paths from these points.
-    BentPaths = 25,
-    /// Rays that find where indirect light is kept.
-    CacheRays = 26,
-    /// Paths that find this light.
-    CachePaths = 27,
     /// Shifts of grids against the scene.
     Offsets = 19,
     /// Points that probes are fitted at.
@@ -54,6 +46,14 @@ pub enum Purpose {
     HeldOutPoints = 22,
     /// Paths from these points.
     HeldOutPaths = 23,
+    /// Bent normals of points of a picture.
+    Bent = 24,
+    /// Paths from these points.
+    BentPaths = 25,
+    /// Rays that find where indirect light is kept.
+    CacheRays = 26,
+    /// Paths that find this light.
+    CachePaths = 27,
     /// Glossy rays that are traced in probes.
     GlossyRays = 32,
     /// Paths of exact glossy light.

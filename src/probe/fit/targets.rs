@@ -41,8 +41,7 @@ const BRIGHTEST: f64 = 0.002;
 
 /// Variance that the points of a place, that is of a cell and a facing, are to be left with, as a share of the square of their light;
 /// less where rows are scarce. Where there is more, noise shows as blotches. Twice as much: 0 to 7 % larger errors in
-/// two_rooms_open's dark side, thin_wall, cornell and courtyard; half as much with twice the paths at most: 0 to 6 % smaller ones, for
-/// 1.1 to 1.7 times the time.
+/// two_rooms_open's dark side, thin_wall, cornell and courtyard; half as much with twice the paths at most: 0 to 7 % smaller ones.
 const NOISE: f64 = 0.01;
 
 /// Side of the patches that paths end at, spacings. In two_rooms_open's dark side, thin_wall, cornell and courtyard errors are the

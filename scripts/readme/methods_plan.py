@@ -89,11 +89,11 @@ def scaled_maps(preset, texels, glossy=False):
 # Ingredients of the default, each taken away or made another: name, settings.
 ABLATION = [
     ("no fit", ["fit=none"]),
-    ("a quarter of the rows", ["fit.rows.rows_per_probe=19"]),
-    ("4 paths a row, also where it is noisy", ["fit.rows.most_paths=4"]),
+    ("a quarter of the rows", ["fit.rows.rows_per_probe=38"]),
+    ("2 paths a row, also where it is noisy", ["fit.rows.most_paths=2"]),
     ("no rows with bent normals", ["fit.rows.bent=0"]),
     ("no rows in the air", ["fit.rows.air=0"]),
-    ("10 × as firm (lambda)", ["fit.rows.lambda=0.3"]),
+    ("10 × as firm (lambda)", ["fit.rows.lambda=0.1"]),
     ("no gradients", ["store.irradiance.sh9.gradient=false"]),
     ("maps of 8² texels", ["store.irradiance=octahedral(resolution: 8)"]),
     ("no visibility", ["store.occlusion=none", "query.test=none"]),

@@ -26,9 +26,6 @@ pub struct Grids {
     pub values: Vec<Vec3A>,
 }
 
-/// Share of its light below which a lit point counts as black, as in `leak.black` of reports.
-const BLACK: f64 = 0.05;
-
 /// The most that a probe holds.
 const MOST: usize = harmonics::COUNT;
 
@@ -182,7 +179,7 @@ impl Fitted for Grids {
         let oct = oct_from_direction(asked.query.normal);
         let mut parts = Vec::with_capacity(8);
         self.each_share(&asked.query, |probe, share| parts.push(Part { probe, share, oct, offset: Vec3::ZERO }));
-        Row { parts, target, noise: 0.0, weight: asked.weight }
+        Row { parts, target, noise: 0.0, weight: asked.weight, kind: asked.kind }
     }
 
     fn solve(&mut self, rows: Vec<Row>, settings: &RowSettings) -> u32 {
@@ -190,26 +187,14 @@ impl Fitted for Grids {
         let mut rows = Rows::new(&factors, self.positions.len(), unknowns, rows.into_iter());
         let lambda = firmness(&rows, &factors, &self.values, settings.lambda);
         let (prior, iterations) = (&self.values, settings.iterations);
-        let solve = |rows: &Rows| {
-            let task = solve::Task { rows, prior, lambda: lambda.clone(), iterations };
-            task.solve(if self.rules.is_signed() { 0 } else { ROUNDS })
-        };
-        let mut solved = solve(&rows);
-        let mut iterations = solved.iterations;
-        if self.rules.is_signed() {
-            // Beside a wall with light behind it least squares go below 0, where the shader shows black.
-            for _ in 0..ROUNDS {
-                if rows.weigh_black(&solved.values, BLACK) == 0 {
-                    break;
-                }
-                solved = solve(&rows);
-                iterations += solved.iterations;
-            }
-        }
+        let is_signed = self.rules.is_signed();
+        // Beside a wall with light behind it least squares go below 0, where the shader shows black.
+        let mut task = solve::Task { rows: &mut rows, prior, lambda, iterations, lightens: is_signed };
+        let solved = task.solve(if is_signed { 0 } else { ROUNDS });
         let asked = rows.asked();
         for (p, values) in solved.values.chunks(unknowns).enumerate().filter(|(p, _)| asked[*p]) {
             self.set_probe(p, values);
         }
-        iterations
+        solved.iterations
     }
 }

@@ -57,7 +57,7 @@ fn points(scene: &Scene, count: u32) -> Vec<Asked> {
 }
 
 /// Harmonics with gradients.
-const FITTED: &str = "--set grid.spacing_m=2 --set fit=rows(rows_per_probe:20,paths:4)";
+const FITTED: &str = "--set grid.spacing_m=2 --set fit=rows(rows_per_probe:20,paths:2)";
 
 /// `scripts/readme/read_probes.py`, which is the look-up of src/probe/README.md as a program, and the tool's own look-up:
 /// the same at 10,000 points.

@@ -103,7 +103,7 @@ fn light_leaks_into_the_air_without_visibility() {
 #[test]
 fn an_object_that_the_bake_did_not_know_is_lit() {
     let folder = Folder::new();
-    let set = "--set grid.spacing_m=1 --set fit=rows(rows_per_probe:20,paths:4)";
+    let set = "--set grid.spacing_m=1 --set fit=rows(rows_per_probe:20,paths:2)";
     let baked = bake(&folder, &scene("two_rooms_open"), set);
     let view = "--camera ball --size 64x36 --reference 64 --allow-scene-change";
     let report = render(&folder, &scene("two_rooms_ball"), &baked.path, "run", view);

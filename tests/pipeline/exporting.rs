@@ -25,7 +25,7 @@ fn record(folder: &Path) -> Value {
 }
 
 const COARSE: &str = "--set grid.spacing_m=1.5 --set capture.rays.octahedral.resolution=8";
-const FIT: &str = "--fit --set fit.rows.rows_per_probe=40 --set fit.rows.paths=8";
+const FIT: &str = "--fit --set fit.rows.rows_per_probe=40 --set fit.rows.paths=4";
 
 #[test]
 fn what_render_says_of_an_engine_is_what_the_exported_folder_gives() {

@@ -6,7 +6,7 @@ use crate::common::{Folder, Gltf};
 use crate::program::{bake, method, names_in, refuse, render, run, scene, succeed, text};
 
 /// Rough and quick.
-const ROUGH: &str = "--set fit=rows(rows_per_probe:30,paths:4)";
+const ROUGH: &str = "--set fit=rows(rows_per_probe:30,paths:2)";
 
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))

@@ -131,10 +131,11 @@ pub fn run_on(
 pub fn fit_rows(volume: &mut Volume, rows: impl Iterator<Item = Row>, settings: &RowSettings) -> u32 {
     let factors = volume.irradiance.factors();
     let unknowns = volume.irradiance.fitted_unknowns();
-    let rows = Rows::new(&factors, volume.states.len(), unknowns, rows);
+    let mut rows = Rows::new(&factors, volume.states.len(), unknowns, rows);
     let prior: Vec<Vec3A> = (0..volume.states.len()).flat_map(|p| volume.irradiance.fitted(p)).collect();
     let lambda = firmness(&rows, &factors, &prior, settings.lambda);
-    let task = solve::Task { rows: &rows, prior: &prior, lambda, iterations: settings.iterations };
+    let lightens = volume.irradiance.signed().is_some();
+    let mut task = solve::Task { rows: &mut rows, prior: &prior, lambda, iterations: settings.iterations, lightens };
     // Irradiance is nowhere negative. Coefficients have signs, but for the mean of all directions.
     let solved = match volume.irradiance.signed() {
         None => task.solve(ROUNDS),

@@ -35,22 +35,25 @@ pub struct RowSettings {
     pub rows_per_probe: u32,
     /// Paths from each point where there are [`USUAL_ROWS`], in proportion more where there are fewer: see [`RowSettings::paths`].
     pub paths: u32,
-    /// The same for points of surfaces where fewer leave much noise. With 4 as from all: 1.0 to 1.4 × the error.
+    /// The same for points of surfaces where fewer leave much noise. With 8 errors in pictures of two_rooms_open's dark side,
+    /// cornell, courtyard and office are 1.01 to 1.08 × those with 16, for 0.74 to 0.98 × the time.
     pub most_paths: u32,
     /// Weight of a row with a bent normal, beside 1 of the surface's own; 0: there are none.
     pub bent: f32,
-    /// Weight of a row in the air; 0: there are none. With 0.3 errors are 1.01 to 1.07 times as large in pictures of five scenes,
-    /// 1.0 to 1.03 times in their air; with 0.03 at most 3 % smaller in pictures, up to a tenth larger in the air (courtyard).
+    /// Weight of a row in the air; 0: there are none. With 0.2 errors are 1.1 times as large in pictures of office and cornell, and
+    /// as they are in their air. With half as many rows and 0.03 they were up to a tenth larger in courtyard's air.
     pub air: f32,
-    /// How much a squared difference of values from those before the fit counts beside one of a row. With 0.3: 1.17 to 1.25 ×
-    /// the error in pictures of two_rooms_open, thin_wall and cornell, with 0.01 as much as with 0.03.
+    /// How much a squared difference of values from those before the fit counts beside one of a row. With 0.02 errors in pictures
+    /// of cornell, courtyard and office are 1.01 to 1.03 × as large, in their air 0.97 to 1 ×; with 0.06 in office and cornell 1.09 and
+    /// 1.15 × and 0.97 and 0.95 ×.
     pub lambda: f32,
     /// Most iterations of the solver.
     pub iterations: u32,
 }
 
-/// Rows a probe that the numbers of paths are given for.
-const USUAL_ROWS: u32 = 75;
+/// Rows a probe that the numbers of paths are given for. With 75 errors in office are 1.1 times as large, and with a quarter of
+/// them 1.4 times as large as that.
+const USUAL_ROWS: u32 = 150;
 
 /// Most rows of a probe, paths of a row and iterations.
 const MOST_ROWS: u32 = 65_536;
@@ -59,11 +62,11 @@ impl Default for RowSettings {
     fn default() -> Self {
         RowSettings {
             rows_per_probe: USUAL_ROWS,
-            paths: 4,
-            most_paths: 32,
+            paths: 2,
+            most_paths: 10,
             bent: 0.5,
             air: 0.1,
-            lambda: 0.03,
+            lambda: 0.01,
             iterations: 40,
         }
     }
@@ -84,8 +87,8 @@ impl RowSettings {
 
     /// Paths from each point of a kind of row, least and most.
     ///
-    /// The fewer rows there are the more each of them counts, noise and all. With 19 rows errors in pictures of nine scenes are 1.03
-    /// to 1.25 times those with 75, in office 1.4 times.
+    /// The fewer rows there are the more each of them counts, noise and all. With 38 rows errors in pictures of ten are 1.04 to
+    /// 1.17 times those with 150.
     ///
     /// A row of weight ω adds ω²σ²/n of noise to the sums. For a given number of paths in all that is least with n in proportion to ω,
     /// but for the least: with half of it for bent normals and the air, probes that hang on few rows of the air differed by 109 %

@@ -328,9 +328,9 @@ fn held_out_points_of_each_kind_have_figures_of_their_own() {
 
 #[test]
 fn scarce_rows_have_more_paths_and_light_ones_fewer() {
-    // 75/19 = 3.95 times as many where there are 19.
+    // 150/38 = 3.95 times as many where there are 38.
     for (rows_per_probe, paths) in
-        [(75, [[4, 32], [4, 16], [4, 4]]), (150, [[4, 32], [4, 16], [4, 4]]), (19, [[16, 127], [16, 64], [16, 16]])]
+        [(150, [[2, 10], [2, 5], [2, 2]]), (300, [[2, 10], [2, 5], [2, 2]]), (38, [[8, 40], [8, 20], [8, 8]])]
     {
         let settings = RowSettings { rows_per_probe, ..RowSettings::default() };
         assert_eq!([Kind::Surface, Kind::Bent, Kind::Air].map(|kind| settings.paths(kind)), paths);

@@ -6,7 +6,8 @@ use super::fixture::{SPACING, export, grids, origin, points, untested, volume};
 use crate::export::made::one_block;
 use crate::export::{Export, Rules, Written, record};
 use crate::probe::fit::points::asked_in_air;
-use crate::probe::fit::{Fitted, RowSettings};
+use crate::probe::fit::rows::Row;
+use crate::probe::fit::{Fitted, Kind, RowSettings};
 use crate::probe::lattice::ProbeState;
 use crate::probe::query::{Answers, Query, QueryPoint, Visibility};
 
@@ -31,7 +32,7 @@ fn rows_of_a_fit_are_the_look_up() {
 }
 
 /// Least squares of a step from 0.02 to 1 between two probes give −0.225 + 1.47x, x from 0 to 1: 9 of 60 rows are black. With
-/// the weight of the black ones doubled three times, as often as there are any, they give −0.097 + 1.28x, and 5 are.
+/// 16 times the weight of these they give −0.087 + 1.255x, and 4 are.
 #[test]
 fn a_fit_for_three_leaves_less_black() {
     const ROWS: usize = 60;
@@ -40,13 +41,14 @@ fn a_fit_for_three_leaves_less_black() {
     let at = |i: usize| (i as f32 + 0.5) / ROWS as f32;
     let asked: Vec<_> = (0..ROWS).map(|i| asked_in_air(first + at(i) * SPACING * Vec3::X, Vec3::Y)).collect();
     let target = |i: usize| if at(i) < 0.5 { 0.02 } else { 1.0 };
-    let rows = asked.iter().enumerate().map(|(i, asked)| own.row(asked, Vec3::splat(target(i)))).collect();
+    let row = |(i, asked)| Row { kind: Kind::Surface, ..own.row(asked, Vec3::splat(target(i))) };
+    let rows = asked.iter().enumerate().map(row).collect();
     // So small that the values before the fit do not count.
     own.solve(rows, &RowSettings { lambda: 1e-6, ..RowSettings::default() });
     let is_black = |i: &usize| own.irradiance(&asked[*i].query, Visibility::Stored).x < 0.05 * target(*i);
     let black = (0..ROWS).filter(is_black).count();
     // A row's place on the line may round to either side.
-    assert!((4..=6).contains(&black), "{black} of {ROWS} rows");
+    assert!((3..=5).contains(&black), "{black} of {ROWS} rows");
 }
 
 #[test]

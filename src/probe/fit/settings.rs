@@ -73,9 +73,11 @@ impl Default for RowSettings {
 }
 
 impl RowSettings {
-    /// Points that are looked for: on surfaces, there with bent normals, in the air.
+    /// Points that are looked for: on surfaces, there with bent normals, in the air. At least as many as the probes of a cell have:
+    /// the fewer rows there are in all, the more their noise shows.
     pub fn points(&self, active: usize) -> [usize; 3] {
-        let all = self.rows_per_probe as usize * active;
+        const CELL: usize = 8;
+        let all = self.rows_per_probe as usize * active.max(CELL);
         let half = |weight: f32| if weight > 0.0 { all / 2 } else { 0 };
         [all, half(self.bent), half(self.air)]
     }

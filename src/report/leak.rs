@@ -11,6 +11,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::reference_layers::ReferenceLayers;
 use crate::math::color::luminance;
 use crate::math::statistics::Moments;
+use crate::probe::fit::rows::BLACK_SHARE;
 use crate::probe::query::Answers;
 use crate::shade::points::ImagePoint;
 use crate::shade::visibility_modes::VisibilityMode;
@@ -87,9 +88,6 @@ pub fn dark_region(irradiance: &[Vec3], reference: &ReferenceLayers, shown: &[bo
     let dark: Moments = (0..irradiance.len()).filter(is_dark).map(|i| f64::from(luminance(irradiance[i]))).collect();
     (dark.weight() > 0.0).then(|| dark.mean() / mean)
 }
-
-/// A lit pixel is black if it gets less than this share of its light: more than four stops are missing.
-const BLACK_SHARE: f64 = 0.05;
 
 /// Share of the pixels that are falsely black: E < [`BLACK_SHARE`]·E_ref, of those with E_ref above
 /// [`DARK_SHARE`]·mean(E_ref). `shown` tells for each pixel whether it shows a surface. `None` where none is lit.

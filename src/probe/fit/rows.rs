@@ -58,8 +58,9 @@ pub struct Rows<'f, 'i> {
     of_probe: Vec<(u32, u32)>,
 }
 
-/// A row is black that gets less than this share of its light, as pixels of `leak.black` are.
-const BLACK_SHARE: f64 = 0.05;
+/// What is lit is black if it gets less than this share of its light: more than four stops are missing. `leak.black` of reports
+/// counts such pixels.
+pub const BLACK_SHARE: f64 = 0.05;
 
 /// Standard deviations of a row's noise that its light is lessened by before it is called black: what one bright path brings is not
 /// to be fitted. Without it errors in pictures of glossy_room are 1.06 times as large.
